@@ -1,0 +1,1 @@
+"""Device drivers, one module or folder per family; ``replay`` is one like the others."""

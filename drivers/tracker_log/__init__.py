@@ -1,0 +1,1 @@
+"""The tracker log: MCAP files of samples, states and truth."""

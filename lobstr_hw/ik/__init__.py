@@ -1,0 +1,1 @@
+"""Inverse kinematics: legs, arms, spine; plain functions over batches."""

@@ -1,0 +1,1 @@
+"""Predictors: a step is a function (see :mod:`lobstr_hw.predictors.predictor`)."""

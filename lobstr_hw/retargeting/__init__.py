@@ -1,0 +1,1 @@
+"""Motion clips of any common rig, brought onto the standard skeleton."""

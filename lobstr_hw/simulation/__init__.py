@@ -1,0 +1,1 @@
+"""Simulated users: bodies, mounts and tracking errors, for made logs, training and tests."""

@@ -1,0 +1,1 @@
+"""The fixed-rate loop, its outputs, and the command lines."""

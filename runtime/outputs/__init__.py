@@ -1,0 +1,1 @@
+"""Where skeletons go: one module per sink."""
