@@ -1,0 +1,17 @@
+"""Options and shared fixtures of all tests."""
+
+import pytest
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--hardware", action="store", metavar="DRIVER", help="run on a real device")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Long runs are asked for by name; devices by --hardware."""
+    soak = "soak" in (config.getoption("-m") or "")
+    for item in items:
+        if "soak" in item.keywords and not soak:
+            item.add_marker(pytest.mark.skip(reason="takes long: pytest -m soak"))
+        if "hardware" in item.keywords and not config.getoption("--hardware"):
+            item.add_marker(pytest.mark.skip(reason="needs a device: pytest --hardware DRIVER"))
