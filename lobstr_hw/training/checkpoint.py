@@ -1,0 +1,97 @@
+"""A run that can be killed at any moment and goes on as if nothing had happened.
+
+What a step does depends on the seed and the step's number only, so the random state that has to be
+kept is one integer. The file holds tensors and numbers, never code (``weights_only``).
+"""
+
+import os
+import pickle
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from lobstr_hw.errors import ModelError
+from lobstr_hw.training.config import TrainingConfig
+from lobstr_hw.training.dataset import Statistics
+from lobstr_hw.training.network import LobstrNetwork
+
+__all__ = ["Run", "load_checkpoint", "new_run", "save_checkpoint"]
+
+
+@dataclass(slots=True, eq=False)
+class Run:
+    """A training run in memory.
+
+    Attributes:
+        network: being trained.
+        optimizer: Adam.
+        stats: of the training clips.
+        step: steps done.
+        wall_s: seconds spent, over all resumed parts.
+        curve: one row per step, and per validation (see ``loop.CURVE_COLUMNS``).
+        validation: one row per validation.
+    """
+
+    network: LobstrNetwork
+    optimizer: torch.optim.Adam
+    stats: Statistics
+    step: int = 0
+    wall_s: float = 0.0
+    curve: list[list[float]] = field(default_factory=list)
+    validation: list[list[float]] = field(default_factory=list)
+
+
+def new_run(config: TrainingConfig, stats: Statistics) -> Run:
+    """Fresh weights from the seed."""
+    torch.manual_seed(config.seed)
+    network = LobstrNetwork(config.hidden_size, torch.from_numpy(stats.output_mean))
+    return Run(network, torch.optim.Adam(network.parameters(), lr=config.learning_rate), stats)
+
+
+def save_checkpoint(path: Path, run: Run) -> None:
+    """Write atomically: the old file stays whole until the new one is."""
+    document = {
+        "network": run.network.state_dict(),
+        "optimizer": run.optimizer.state_dict(),
+        "stats": {name: torch.from_numpy(getattr(run.stats, name)) for name in _STATS},
+        "step": run.step,
+        "wall_s": run.wall_s,
+        "curve": torch.tensor(run.curve, dtype=torch.float64),
+        "validation": torch.tensor(run.validation, dtype=torch.float64),
+    }
+    partial = path.with_suffix(".partial")
+    with partial.open("wb") as file:
+        torch.save(document, file)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(partial, path)
+
+
+_STATS = ("input_mean", "input_scale", "output_mean", "contact_mean")
+
+
+def load_checkpoint(path: Path, config: TrainingConfig) -> Run:
+    """Go on from a file of :func:`save_checkpoint`.
+
+    Raises:
+        ModelError: there is none, or it is damaged or of another configuration.
+    """
+    try:
+        document: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
+        stats = Statistics(**{name: document["stats"][name].numpy() for name in _STATS})
+        run = new_run(config, stats)
+        run.network.load_state_dict(document["network"])
+        run.optimizer.load_state_dict(document["optimizer"])
+        run.step, run.wall_s = int(document["step"]), float(document["wall_s"])
+        run.curve, run.validation = document["curve"].tolist(), document["validation"].tolist()
+    except FileNotFoundError as error:
+        raise ModelError(f"{path}: no checkpoint. Start without --resume.") from error
+    except (OSError, RuntimeError, KeyError, ValueError, EOFError, pickle.UnpicklingError) as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise ModelError(
+            f"{path}: not a checkpoint of this configuration ({reason}). "
+            "Use the run's own config.json, or start in a new folder."
+        ) from error
+    return run

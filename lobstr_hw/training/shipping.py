@@ -1,0 +1,81 @@
+"""The card of a finished run, and its export."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from lobstr_hw.errors import ModelError
+from lobstr_hw.features import FEATURE_VERSION
+from lobstr_hw.predictors.lobstr import GIVES
+from lobstr_hw.predictors.predictor import ModelCard
+from lobstr_hw.predictors.weights import NetworkCard, write_card
+from lobstr_hw.skeleton import SKELETON_VERSION
+from lobstr_hw.trackers import FOUR_POINTS
+from lobstr_hw.training.checkpoint import Run, load_checkpoint
+from lobstr_hw.training.config import TrainingConfig, read_config
+from lobstr_hw.training.dataset import RATE_HZ
+from lobstr_hw.training.export import ExportError, export_network
+from lobstr_hw.training.network import parameter_count
+
+__all__ = ["export_run", "network_card"]
+
+MODEL_VERSION = "1"
+
+
+def network_card(run: Run, config: TrainingConfig, details: dict[str, Any]) -> NetworkCard:
+    """What the code needs to know of these weights, and what people want to know."""
+    model = ModelCard(
+        name="lobstr",
+        version=MODEL_VERSION,
+        rate_hz=RATE_HZ,
+        delay_frames=0,
+        needs=FOUR_POINTS,
+        accepts=FOUR_POINTS,
+        gives=GIVES,
+        contacts=True,
+        feature_version=FEATURE_VERSION,
+        skeleton_version=SKELETON_VERSION,
+        details=details,
+    )
+    stats = run.stats
+    return NetworkCard(
+        model,
+        config.feature_form,
+        config.hidden_size,
+        stats.input_mean,
+        stats.input_scale,
+        stats.output_mean,
+        stats.contact_mean,
+    )
+
+
+def export_run(folder: Path, out: Path) -> ExportError:
+    """Write the weights of a run's newest checkpoint as ``out`` (.onnx) with its card.
+
+    Raises:
+        ModelError: the folder is no run.
+    """
+    config = read_config(folder / "config.json")
+    run = load_checkpoint(folder / "checkpoint.pt", config)
+    details = {
+        "architecture": f"GRU {config.hidden_size}, Linear 128 + ReLU, heads 48 and 4",
+        "parameters": parameter_count(run.network),
+        "steps_done": run.step,
+        "wall_s": round(run.wall_s),
+        "data": _read_data(folder / "data.json"),
+        "configuration": asdict(config),
+    }
+    error = export_network(run.network, network_card(run, config, details), out)
+    details["float16_storage_error"] = asdict(error)
+    write_card(out.with_suffix(".json"), network_card(run, config, details))
+    return error
+
+
+def _read_data(path: Path) -> dict[str, Any]:
+    try:
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError) as error:
+        raise ModelError(
+            f"{path}: the run does not say what it was trained on ({error})."
+        ) from error
