@@ -1,0 +1,134 @@
+"""A fake person with four trackers: for tests, and for a look around without any device."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from lobstr_hw.drivers.driver import DeviceEvent, DeviceInfo, Probe, TrackerDriver
+from lobstr_hw.poses import PartialPose
+from lobstr_hw.rotations import Array, rotation_x, rotation_y, rotation_z
+from lobstr_hw.skeleton import EYES, GRIP, Body, Joint, forward_kinematics
+from lobstr_hw.trackers import FOUR_POINTS, ROLE_JOINT, TrackerRole, TrackerSample
+
+__all__ = ["FakeDriver"]
+
+SERIALS = {role: f"FAKE-{role.upper().replace('_', '-')}" for role in FOUR_POINTS}
+KINDS = dict(zip(FOUR_POINTS, ("headset", "controller", "controller", "tracker"), strict=True))
+MOUNTS = {
+    TrackerRole.HEAD: EYES,
+    TrackerRole.LEFT_HAND: GRIP,
+    TrackerRole.RIGHT_HAND: GRIP * [-1.0, 1.0, 1.0],
+    TrackerRole.PELVIS: np.array([0.0, 0.03, 0.11]),
+}
+"""Where each device sits in its joint, metres on the standard skeleton."""
+
+T_POSE_S = 4.0
+"""Long enough for the calibration's 3 s."""
+LOWER_S = 1.5
+ARMS_DOWN = np.radians(75.0)
+SWAY = np.radians(3.0)
+SWAY_HZ = 0.3
+JITTER_M = 1e-4
+"""What Lighthouse trackers show on a table."""
+
+
+class FakeDriver(TrackerDriver):
+    """Someone who stands in a T-pose for 4 s, lowers the arms, then sways for ever.
+
+    The same seed gives the same samples, however it is polled.
+    """
+
+    options: ClassVar = {"seed": int, "rate_hz": float, "height_cm": float}
+    """What ``--driver fake:...`` understands, and how it is read."""
+
+    def __init__(self, seed: int = 0, rate_hz: float = 90.0, height_cm: float = 170.0) -> None:
+        """Choose a person.
+
+        Args:
+            seed: of the trackers' jitter.
+            rate_hz: samples per second and tracker.
+            height_cm: stature.
+        """
+        if rate_hz <= 0.0 or height_cm <= 0.0:
+            raise ValueError(f"rate_hz and height_cm must be positive: {rate_hz}, {height_cm}")
+        self._seed, self._rate_hz = seed, rate_hz
+        self._body = Body.standard(1, height_cm / 170.6)
+        self._next = 0
+        self._random = np.random.default_rng(seed)
+        self._is_open = False
+
+    @classmethod
+    def probe(cls) -> Probe:
+        """Always there."""
+        return Probe(available=True)
+
+    def open(self) -> None:
+        """Begin at time 0."""
+        self._next, self._random = 0, np.random.default_rng(self._seed)
+        self._is_open = True
+
+    def poll(self, now_s: float) -> Sequence[TrackerSample]:
+        """The samples at whole multiples of the period, up to now_s."""
+        if not self._is_open:
+            return ()
+        stop = int(np.floor(now_s * self._rate_hz + 1e-9)) + 1
+        times = np.arange(self._next, stop) / self._rate_hz
+        times = times[times <= now_s]
+        self._next += len(times)
+        if not len(times):
+            return ()
+        p, R = _trackers(times, self._body)
+        p = p + self._random.normal(scale=JITTER_M, size=p.shape)
+        return [
+            TrackerSample(SERIALS[role], PartialPose(R[i, k], p[i, k]), float(time_s), tracked=True)
+            for i, time_s in enumerate(times)
+            for k, role in enumerate(FOUR_POINTS)
+        ]
+
+    def devices(self) -> Sequence[DeviceInfo]:
+        """Headset, two controllers, one tracker."""
+        if not self._is_open:
+            return ()
+        return [
+            DeviceInfo(SERIALS[role], KINDS[role], "fake", role, battery=1.0)
+            for role in FOUR_POINTS
+        ]
+
+    def events(self) -> Sequence[DeviceEvent]:
+        """Nobody presses anything."""
+        return ()
+
+    def close(self) -> None:
+        """Stop giving samples; twice is harmless."""
+        self._is_open = False
+
+
+def _trackers(times_s: Array, body: Body) -> tuple[Array, Array]:
+    """Device poses (m, 4, 3) and (m, 4, 3, 3); devices face -Z, so each is turned about Y."""
+    p, R = _joints(times_s, body)
+    joints = [ROLE_JOINT[role] for role in FOUR_POINTS]
+    mounts = np.stack([MOUNTS[role] for role in FOUR_POINTS]) / body.scale[0]
+    R = R[:, joints]
+    return p[:, joints] + (R @ mounts[..., None])[..., 0], R @ rotation_y(np.pi)
+
+
+def _joints(times_s: Array, body: Body) -> tuple[Array, Array]:
+    """The person (m, 22, 3) and (m, 22, 3, 3); the legs, which no tracker sees, stay straight."""
+    down = ARMS_DOWN * _smooth((times_s - T_POSE_S) / LOWER_S)
+    calm = _smooth((times_s - T_POSE_S - LOWER_S) / LOWER_S)
+    sway = calm * SWAY * np.sin(2.0 * np.pi * SWAY_HZ * times_s)
+    R = np.tile(np.eye(3), (len(times_s), 22, 1, 1))
+    R[:, Joint.LEFT_UPPER_ARM] = rotation_z(-down)
+    R[:, Joint.RIGHT_UPPER_ARM] = rotation_z(down)
+    R[:, Joint.SPINE] = rotation_z(sway) @ rotation_x(0.5 * sway)
+    R[:, Joint.NECK] = rotation_y(2.0 * sway)
+    p_hips = np.tile(body.offsets[0, Joint.HIPS], (len(times_s), 1))
+    p_hips[:, 0] -= 0.5 * sway / body.scale[0]
+    return forward_kinematics(R, p_hips, body.offsets[0])
+
+
+def _smooth(x: Array) -> Array:
+    """0 before 0, 1 after 1, smooth between."""
+    x = np.clip(x, 0.0, 1.0)
+    return np.asarray(x * x * (3.0 - 2.0 * x))
