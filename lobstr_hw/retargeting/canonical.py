@@ -1,0 +1,208 @@
+"""Joint frames that mean the same on every rig, fitted from the motion (docs/retargeting.md).
+
+A rig's zero pose is its maker's choice: legs splayed, bones along X, the pelvis pitched by 20
+degrees. So the frames are told from how a person moves. For each joint a constant turn A takes the
+rig's frame to the standard skeleton's: ``R_world_canonical = R_world_rig @ A``.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lobstr_hw.retargeting.evidence import Evidence, gather
+from lobstr_hw.retargeting.source import LEGS, SourceClip
+from lobstr_hw.rotations import Array, heading, normalize, rotation_mean, transpose
+from lobstr_hw.skeleton import PARENTS, STANDARD_OFFSETS, Joint
+
+__all__ = ["CanonicalFrames", "canonical_rotations", "fit_frames"]
+
+_UP = np.array([0.0, 1.0, 0.0])
+_TRUNK = (Joint.SPINE, Joint.CHEST, Joint.UPPER_CHEST, Joint.NECK, Joint.HEAD)
+_ARMS = (
+    (Joint.LEFT_SHOULDER, Joint.LEFT_UPPER_ARM, Joint.LEFT_LOWER_ARM, Joint.LEFT_HAND),
+    (Joint.RIGHT_SHOULDER, Joint.RIGHT_UPPER_ARM, Joint.RIGHT_LOWER_ARM, Joint.RIGHT_HAND),
+)
+_BENT = np.radians(25.0)
+_ANKLE_DROP = -float(STANDARD_OFFSETS[Joint.LEFT_TOES, 1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CanonicalFrames:
+    """What was fitted for one subject on one rig.
+
+    Attributes:
+        A: (22, 3, 3) rig frame to canonical frame.
+        lift: metres (standard size) to raise the hips by, because the rig's ankle stands higher or
+            lower over its toe base than the standard's.
+        mapped: the joints that the rig has.
+        notes: where there was too little to fit from, and what was done instead.
+    """
+
+    A: Array
+    lift: float
+    mapped: tuple[Joint, ...]
+    notes: tuple[str, ...] = ()
+
+
+def fit_frames(clips: Sequence[SourceClip]) -> CanonicalFrames:
+    """Fit the canonical frames of one subject on one rig.
+
+    Args:
+        clips: of this subject, all on the same rig.
+    """
+    mapped = clips[0].mapped
+    if all(clip.standard for clip in clips):
+        return CanonicalFrames(np.tile(np.eye(3), (22, 1, 1)), 0.0, mapped)
+    return _Fit(gather(clips), clips[0]).frames()
+
+
+class _Fit:
+    """The steps of one fit; each joint's frame may use the ones before it."""
+
+    def __init__(self, evidence: Evidence, clip: SourceClip) -> None:
+        self.e = evidence
+        self.rest = clip.p_rest
+        self.mapped = clip.mapped
+        self.A = np.tile(np.eye(3), (22, 1, 1))
+        self.notes: list[str] = list(evidence.notes)
+
+    def frames(self) -> CanonicalFrames:
+        self._hips()
+        self._trunk()
+        for side in (0, 1):
+            self._leg(side)
+            self._arm(side)
+        lift = self._lift()
+        return CanonicalFrames(self.A, lift, self.mapped, tuple(self.notes))
+
+    def _canonical(self, joint: int) -> Array:
+        return np.asarray(self.e.R[:, joint] @ self.A[joint])
+
+    def _inside(self, joint: int, v: Array) -> Array:
+        """World vectors in a joint's own frame."""
+        return np.asarray((transpose(self.e.R[:, joint]) @ v[..., None])[..., 0])
+
+    def _hips(self) -> None:
+        line = self.e.p[:, Joint.LEFT_UPPER_LEG] - self.e.p[:, Joint.RIGHT_UPPER_LEG]
+        x = _direction(self._inside(Joint.HIPS, line))
+        if self.e.upright.any():
+            up = _direction(self._inside(Joint.HIPS, np.broadcast_to(_UP, line.shape))[self.e.upright])
+        else:
+            up = self.rest[Joint.UPPER_CHEST] - self.rest[Joint.HIPS]
+        self.A[Joint.HIPS] = _frame(x=x, y=up)
+
+    def _trunk(self) -> None:
+        ahead = heading(self._canonical(Joint.HIPS))
+        for joint in _TRUNK:
+            if joint in self.mapped:
+                self._follow(joint, ahead, self.e.upright, Joint.HIPS)
+
+    def _follow(self, joint: Joint, target: Array, when: Array, like: Joint) -> None:
+        """The frame that is on average the target's while ``when``; else the rest pose of ``like``."""
+        if when.any():
+            mean = rotation_mean(transpose(self.e.R[when, joint]) @ target[when])
+            self.A[joint] = mean
+        else:
+            self.A[joint] = self.A[like]
+
+    def _leg(self, side: int) -> None:
+        upper, lower, foot, toes = LEGS[side]
+        thigh = self.e.p[:, lower] - self.e.p[:, upper]
+        shin = self.e.p[:, foot] - self.e.p[:, lower]
+        axis = self._hinge(thigh, shin, self._canonical(Joint.HIPS)[:, :, 0], f"{upper.name} knee")
+        self.A[upper] = self._along(upper, -thigh, axis)
+        self.A[lower] = self._along(lower, -shin, axis)
+        flat = self.e.flat[:, side]
+        bone = _direction(self._inside(foot, self.e.p[:, toes] - self.e.p[:, foot]))
+        if flat.any():
+            up = self._inside(foot, np.broadcast_to(_UP, thigh.shape))[flat]
+            self.A[foot] = _frame(y=_direction(up), z=bone, first="y")
+        else:
+            self.notes.append(f"{foot.name}: no flat stance; its frame is from the zero pose")
+            self.A[foot] = _frame(y=self.A[Joint.HIPS][:, 1], z=bone, first="y")
+        self._follow(toes, self._canonical(foot), flat, foot)
+
+    def _hinge(self, upper: Array, lower: Array, otherwise: Array, name: str) -> Array:
+        """World axis (F, 3) of a hinge; NaN in frames that do not show it."""
+        cross = np.cross(upper, lower)
+        sine = np.linalg.norm(cross, axis=-1)
+        bend = np.arctan2(sine, np.sum(upper * lower, axis=-1))
+        bent = bend > _BENT
+        if bent.sum() < 15:
+            self.notes.append(f"{name} never bends: its axis is from the pelvis or the trunk")
+            return otherwise
+        return np.where(bent[:, None], normalize(cross), np.nan)
+
+    def _along(self, joint: Joint, y: Array, x: Array) -> Array:
+        """Y along the bone, X the hinge's axis, both as the joint's own frame has them."""
+        return _frame(y=_direction(self._inside(joint, y)), x=_direction(self._inside(joint, x)), first="y")
+
+    def _arm(self, side: int) -> None:
+        shoulder, upper, lower, hand = _ARMS[side]
+        out = 1.0 - 2.0 * side  # the left arm's bone is along +X, the right's along -X
+        arm = self.e.p[:, lower] - self.e.p[:, upper]
+        forearm = self.e.p[:, hand] - self.e.p[:, lower]
+        chest = self._canonical(Joint.UPPER_CHEST)
+        # arms hang: an elbow's axis points to the side then, and up in the T-pose
+        axis = self._hinge(out * forearm, arm, out * chest[:, :, 0], f"{upper.name} elbow")
+        for joint, bone in ((upper, arm), (lower, forearm)):
+            x = _direction(self._inside(joint, out * bone))
+            y = _direction(self._inside(joint, axis))
+            self.A[joint] = _frame(x=x, y=y)
+        self._follow(hand, self._canonical(lower), self.e.upright, lower)
+        if shoulder in self.mapped:
+            self._follow(shoulder, chest, self.e.upright, Joint.UPPER_CHEST)
+
+    def _lift(self) -> float:
+        drops = [
+            (self.e.p[:, foot, 1] - self.e.p[:, toes, 1])[self.e.flat[:, side]]
+            for side, (_, _, foot, toes) in enumerate(LEGS)
+        ]
+        both = np.concatenate(drops)
+        return _ANKLE_DROP - float(np.median(both)) if len(both) else 0.0
+
+
+def _direction(v: Array) -> Array:
+    """The median direction (3,) of vectors (F, 3), NaN left out."""
+    return normalize(np.nanmedian(v, axis=0))
+
+
+def _frame(
+    x: Array | None = None, y: Array | None = None, z: Array | None = None, first: str = "x"
+) -> Array:
+    """A rotation from two of its axes; ``first`` is kept, the other made orthogonal to it."""
+    axes = {name: v for name, v in zip("xyz", (x, y, z), strict=True) if v is not None}
+    (second,) = set(axes) - {first}
+    a = normalize(axes[first])
+    b = normalize(axes[second] - (axes[second] @ a) * a)
+    columns = {first: a, second: b}
+    third = ({"x", "y", "z"} - set(columns)).pop()
+    i = "xyz".index(third)
+    columns[third] = np.cross(columns["xyz"[(i + 1) % 3]], columns["xyz"[(i + 2) % 3]])
+    return np.stack([columns[n] for n in "xyz"], axis=-1)
+
+
+def canonical_rotations(clip: SourceClip, frames: CanonicalFrames) -> Array:
+    """World rotations (F, 22, 3, 3) of the standard skeleton's joints.
+
+    Joints that the rig lacks: a clavicle follows the chest; the others stand half-way between their
+    neighbours.
+    """
+    R = clip.R @ frames.A
+    for joint in (j for j in Joint if j not in frames.mapped):
+        parent = R[:, PARENTS[joint]]
+        child = _next_mapped(joint, frames.mapped)
+        turn = joint in _TRUNK and child is not None
+        R[:, joint] = _halfway(parent, R[:, child]) if turn and child is not None else parent
+    return np.asarray(R)
+
+
+def _next_mapped(joint: Joint, mapped: tuple[Joint, ...]) -> int | None:
+    later = [j for j in _TRUNK if j > joint and j in mapped]
+    return int(later[0]) if later else None
+
+
+def _halfway(A: Array, B: Array) -> Array:
+    """The mean of two rotations; the nearest matrix to their sum is the half of the turn."""
+    return rotation_mean(np.stack([A, B]))

@@ -1,0 +1,111 @@
+"""What a subject's clips show about the body: when it walks upright, when a foot stands flat."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from lobstr_hw.retargeting.source import LEGS, SourceClip
+from lobstr_hw.rotations import Array, normalize
+from lobstr_hw.skeleton import Joint
+
+__all__ = ["Evidence", "flat_stance", "gather", "speed"]
+
+Bools = npt.NDArray[np.bool_]
+
+_RATE_HZ = 15.0  # poses further apart than this say nothing new
+_WALK_M_S = (0.4, 2.2)
+_LEAST_WALK_S = 3.0
+_LEAST_UPRIGHT_S = 0.5
+_STILL_M_S = 0.15
+_FLAT_M = 0.020
+_STANDING_M = 0.65
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """Poses of one subject, thinned out.
+
+    Attributes:
+        p: (F, 22, 3) joints, standard size.
+        R: (F, 22, 3, 3) the rig's frames.
+        upright: (F,) walking forward upright, or standing where there is too little walking.
+        flat: (F, 2) a foot stands flat and still.
+        notes: what there was too little of.
+    """
+
+    p: Array
+    R: Array
+    upright: Bools
+    flat: Bools
+    notes: tuple[str, ...]
+
+
+def speed(p: Array, rate_hz: float, span_s: float) -> Array:
+    """Velocity (F, ..., 3) over a centred span, shortened at the ends."""
+    k = max(1, round(span_s * rate_hz / 2.0))
+    i = np.arange(len(p))
+    a, b = np.maximum(i - k, 0), np.minimum(i + k, len(p) - 1)
+    dt = np.maximum(b - a, 1) / rate_hz
+    return np.asarray((p[b] - p[a]) / dt.reshape(-1, *(1,) * (p.ndim - 1)))
+
+
+def gather(clips: Sequence[SourceClip]) -> Evidence:
+    """Thin out, join, and find the walking and standing frames."""
+    parts = [_part(clip) for clip in clips]
+    p, R, flat, forward, height = (np.concatenate(column) for column in zip(*parts, strict=True))
+    tall = height > 0.94 * np.percentile(height, 95.0)
+    walking, notes = tall & forward, []
+    if walking.sum() < _LEAST_WALK_S * _RATE_HZ:
+        notes.append(
+            f"{walking.sum() / _RATE_HZ:.1f} s of walking upright: "
+            "pelvis, trunk and head are from all upright poses"
+        )
+        walking = tall & _looks_upright(p)
+    if walking.sum() < _LEAST_UPRIGHT_S * _RATE_HZ:
+        notes.append("no upright pose: pelvis, trunk and head are from the zero pose")
+        walking = np.zeros_like(walking)
+    return Evidence(p, R, walking, flat, tuple(notes))
+
+
+def _part(clip: SourceClip) -> tuple[Array, Array, Bools, Bools, Array]:
+    centre = clip.hip_centre()
+    v = speed(centre, clip.rate_hz, 0.5)
+    side = clip.p[:, Joint.LEFT_UPPER_LEG] - clip.p[:, Joint.RIGHT_UPPER_LEG]
+    ahead = normalize(np.cross(side, [0.0, 1.0, 0.0]) * [1.0, 0.0, 1.0])
+    along = np.sum(v * ahead, axis=-1)
+    across = np.hypot(v[:, 0], v[:, 2])
+    lowest = clip.p[:, [leg[3] for leg in LEGS], 1].min(axis=1)
+    forward = (along > 0.85 * across) & (along > _WALK_M_S[0]) & (along < _WALK_M_S[1])
+    thin = slice(0, None, max(1, round(clip.rate_hz / _RATE_HZ)))
+    flat = flat_stance(clip)
+    return clip.p[thin], clip.R[thin], flat[thin], forward[thin], (centre[:, 1] - lowest)[thin]
+
+
+def _looks_upright(p: Array) -> Bools:
+    """The trunk within 30 degrees of the vertical."""
+    trunk = normalize(p[:, Joint.HEAD] - p[:, Joint.HIPS])
+    return np.asarray(trunk[:, 1] > np.cos(np.radians(30.0)))
+
+
+def flat_stance(clip: SourceClip) -> Bools:
+    """Frames (F, 2) in which ankle and toe base are still and as high as they are in most stances.
+
+    A still ankle over a still toe base is a foot flat on the floor, unless the person sits or lies:
+    these frames are left out, and so are heights off the median of the rest (a step, a bench).
+    """
+    ankles, toes = [leg[2] for leg in LEGS], [leg[3] for leg in LEGS]
+    heights = [clip.p[:, joints, 1] for joints in (ankles, toes)]  # (F, 2) each
+    still = np.all([_still(clip, joints) for joints in (ankles, toes)], axis=0)
+    stands = clip.hip_centre()[:, 1] - heights[1].min(axis=1) > _STANDING_M
+    still &= stands[:, None]
+    for height in heights:
+        if still.any():
+            still &= np.abs(height - np.median(height[still])) < _FLAT_M
+    return np.asarray(still)
+
+
+def _still(clip: SourceClip, joints: list[Joint]) -> Bools:
+    v = speed(clip.p[:, joints], clip.rate_hz, 0.1)
+    return np.asarray(np.linalg.norm(v, axis=-1) < _STILL_M_S)

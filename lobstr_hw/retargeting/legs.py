@@ -1,0 +1,55 @@
+"""Legs solved anew: a rig's toe base is met although the standard foot and thigh are others."""
+
+import numpy as np
+
+from lobstr_hw.retargeting.source import LEGS
+from lobstr_hw.rotations import Array, normalize
+from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint, forward_kinematics, local_rotations
+
+__all__ = ["solve_legs"]
+
+_THIGH = -float(STANDARD_OFFSETS[Joint.LEFT_LOWER_LEG, 1])
+_SHIN = -float(STANDARD_OFFSETS[Joint.LEFT_FOOT, 1])
+_REACH = 0.9995
+"""Of thigh and shin: at the full length the knee's place would have an infinite slope."""
+
+
+def solve_legs(R_local: Array, p_hips: Array, p_toes: Array) -> Array:
+    """Turn thighs and shins so that the toe bases are met; feet keep their world rotation.
+
+    The knee stays in the plane that the thigh's X axis is normal to. Where the toe base is out of
+    reach the leg is straight towards it.
+
+    Args:
+        R_local: (F, 22, 3, 3) of the standard skeleton.
+        p_hips: (F, 3) metres.
+        p_toes: (F, 2, 3) toe bases to meet.
+
+    Returns:
+        R_local (F, 22, 3, 3).
+    """
+    p, R = forward_kinematics(R_local, p_hips)
+    for side, (upper, lower, foot, toes) in enumerate(LEGS):
+        p_ankle = p_toes[:, side] - R[:, foot] @ STANDARD_OFFSETS[toes]
+        to_ankle = p_ankle - p[:, upper]
+        d = np.linalg.norm(to_ankle, axis=-1)
+        d = np.clip(d, abs(_THIGH - _SHIN) + 1e-4, _REACH * (_THIGH + _SHIN))
+        ahead = normalize(to_ankle)
+        # the knee is on the side to which the hinge (X) opens: hinge x leg
+        x = R[:, upper, :, 0]
+        x = normalize(x - np.sum(x * ahead, axis=-1, keepdims=True) * ahead)
+        front = np.cross(ahead, x)
+        along = (_THIGH**2 - _SHIN**2 + d**2) / (2.0 * d)
+        aside = np.sqrt(np.maximum(_THIGH**2 - along**2, 0.0))
+        p_knee = p[:, upper] + along[:, None] * ahead + aside[:, None] * front
+        p_end = p[:, upper] + d[:, None] * ahead
+        R[:, upper] = _bone(p[:, upper] - p_knee, x)
+        R[:, lower] = _bone(p_knee - p_end, R[:, lower, :, 0])
+    return local_rotations(R)
+
+
+def _bone(y: Array, x: Array) -> Array:
+    """The frame whose Y is along the bone and whose X is nearest to ``x``."""
+    y = normalize(y)
+    x = normalize(x - np.sum(x * y, axis=-1, keepdims=True) * y)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)

@@ -1,0 +1,109 @@
+"""A clip as its rig has it, brought to the 22 joints and to the standard size, frames not fitted."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lobstr_hw.bvh import Bvh, read_bvh
+from lobstr_hw.retargeting.clips import ClipFile
+from lobstr_hw.retargeting.rigs import is_standard, match_rig
+from lobstr_hw.rotations import Array
+from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint
+
+__all__ = ["LEGS", "SourceClip", "load_source"]
+
+LEGS = (
+    (Joint.LEFT_UPPER_LEG, Joint.LEFT_LOWER_LEG, Joint.LEFT_FOOT, Joint.LEFT_TOES),
+    (Joint.RIGHT_UPPER_LEG, Joint.RIGHT_LOWER_LEG, Joint.RIGHT_FOOT, Joint.RIGHT_TOES),
+)
+LEG_LENGTH = -float(STANDARD_OFFSETS[Joint.LEFT_LOWER_LEG, 1] + STANDARD_OFFSETS[Joint.LEFT_FOOT, 1])
+_UNITS_M = (1.0, 0.01, 0.0254, 0.0254 / 0.45, 0.001)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SourceClip:
+    """A clip on its own rig.
+
+    Attributes:
+        p: (F, 22, 3) joint positions in the world, times ``scale``; NaN where the rig has no joint.
+        R: (F, 22, 3, 3) the rig's own joint frames in the world; NaN likewise.
+        R_rest: (22, 3, 3) the joint frames of the zero pose (identity), for rigs without motion.
+        p_rest: (22, 3) joint positions of the zero pose, scaled.
+        mapped: the joints that the rig has.
+        rate_hz: of the frames.
+        scale: standard metres per unit of the file.
+        metres: what 1.0 m of the standard skeleton is on the person.
+        standard: the rig is this project's own.
+        unit_told: whether the unit was known, not guessed.
+    """
+
+    p: Array
+    R: Array
+    p_rest: Array
+    mapped: tuple[Joint, ...]
+    rate_hz: float
+    scale: float
+    metres: float
+    standard: bool
+    unit_told: bool
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.p)
+
+    def hip_centre(self) -> Array:
+        """Midway between the hip joints (F, 3)."""
+        return np.asarray(
+            0.5 * (self.p[:, Joint.LEFT_UPPER_LEG] + self.p[:, Joint.RIGHT_UPPER_LEG])
+        )
+
+
+def load_source(clip: ClipFile) -> SourceClip:
+    """Read a clip and name its joints.
+
+    Raises:
+        MotionFileError: the file cannot be read.
+        UnknownRig: its joints have no table.
+    """
+    bvh = read_bvh(clip.path)
+    _, found = match_rig(bvh.names, str(clip.path))
+    columns = [int(j) for j in found]
+    at = list(found.values())
+    p_all, R_all = bvh.world()
+    p = np.full((len(bvh), 22, 3), np.nan)
+    R = np.full((len(bvh), 22, 3, 3), np.nan)
+    p[:, columns], R[:, columns] = p_all[:, at], R_all[:, at]
+    p_rest = np.full((22, 3), np.nan)
+    p_rest[columns] = _rest(bvh)[at]
+    leg = _leg_length(p)
+    unit = clip.metres_per_unit or min(_UNITS_M, key=lambda u: abs(np.log(u * leg / 0.82)))
+    scale = LEG_LENGTH / leg
+    return SourceClip(
+        p * scale,
+        R,
+        p_rest * scale,
+        tuple(sorted(found)),
+        1.0 / bvh.frame_time_s,
+        scale,
+        unit / scale,
+        is_standard(bvh.names),
+        clip.metres_per_unit is not None,
+    )
+
+
+def _rest(bvh: Bvh) -> Array:
+    p = np.array(bvh.offsets)
+    for joint, parent in enumerate(bvh.parents):
+        if parent >= 0:
+            p[joint] += p[parent]
+    return p
+
+
+def _leg_length(p: Array) -> float:
+    """Thigh and shin, mean of both sides, in the file's unit."""
+    parts = [
+        np.median(np.linalg.norm(p[:, leg[i]] - p[:, leg[i + 1]], axis=-1))
+        for leg in LEGS
+        for i in (0, 1)
+    ]
+    return float(np.sum(parts) / 2.0)
