@@ -1,1 +1,22 @@
-"""Simulated users: bodies, mounts and tracking errors, for made logs, training and tests."""
+"""Tracker recordings made from motion clips: people, mounts and tracking errors, all seeded."""
+
+from lobstr_hw.simulation.t_pose import PoseDeviation, Sway
+from lobstr_hw.simulation.take import SimulatedTake, drawn_user, simulate, take_samples
+from lobstr_hw.simulation.tracking_errors import TrackingErrors
+from lobstr_hw.simulation.transitions import eased, joined, moved
+from lobstr_hw.simulation.users import SimulatedUser, ideal_mounts
+
+__all__ = [
+    "PoseDeviation",
+    "SimulatedTake",
+    "SimulatedUser",
+    "Sway",
+    "TrackingErrors",
+    "drawn_user",
+    "eased",
+    "ideal_mounts",
+    "joined",
+    "moved",
+    "simulate",
+    "take_samples",
+]

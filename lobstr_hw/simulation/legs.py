@@ -1,0 +1,70 @@
+"""Legs of the standard skeleton that stand on given ankles."""
+
+import numpy as np
+
+from lobstr_hw.rotations import Array, normalize
+from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint
+
+__all__ = ["LEGS", "plant", "rotations_to_ankles"]
+
+LEGS = np.array(
+    [
+        [Joint.LEFT_UPPER_LEG, Joint.LEFT_LOWER_LEG, Joint.LEFT_FOOT, Joint.LEFT_TOES],
+        [Joint.RIGHT_UPPER_LEG, Joint.RIGHT_LOWER_LEG, Joint.RIGHT_FOOT, Joint.RIGHT_TOES],
+    ]
+)
+"""Joints of each leg (2, 4), left first."""
+
+_SOCKETS: Array = STANDARD_OFFSETS[LEGS[:, 0]]
+_THIGH = float(-STANDARD_OFFSETS[Joint.LEFT_LOWER_LEG, 1])
+_SHIN = float(-STANDARD_OFFSETS[Joint.LEFT_FOOT, 1])
+
+
+def plant(p_hips: Array, R_hips: Array, p_ankles: Array, bend_m: Array | float = 0.0) -> Array:
+    """The hips (..., 3), lowered as far as the legs must be to reach both ankles (..., 2, 3).
+
+    A leg that has just come straight stops its knee at once. ``bend_m`` (...) rounds that off: so
+    far the hips keep from the height at which a leg is straight.
+    """
+    arm = p_ankles - (p_hips[..., None, :] + _turned(R_hips))
+    level = np.hypot(arm[..., 0], arm[..., 2])
+    highest = np.sqrt(np.maximum((_THIGH + _SHIN) ** 2 - level**2, 0.0))
+    missing = np.max(-arm[..., 1] - highest, axis=-1) + bend_m
+    drop = 0.5 * (missing + np.hypot(missing, bend_m))  # a rounded maximum of this and zero
+    return np.asarray(p_hips - drop[..., None] * np.array([0.0, 1.0, 0.0]))
+
+
+def rotations_to_ankles(
+    p_hips: Array, R_hips: Array, p_ankles: Array, forward: Array
+) -> tuple[Array, Array]:
+    """World rotations (..., 2, 3, 3) of upper and lower legs that bring the ankles to a place.
+
+    Args:
+        p_hips: (..., 3) metres.
+        R_hips: (..., 3, 3).
+        p_ankles: (..., 2, 3); one out of reach is pointed at.
+        forward: (..., 2, 3) where the knees point.
+    """
+    socket = p_hips[..., None, :] + _turned(R_hips)
+    reach = p_ankles - socket
+    distance = np.linalg.norm(reach, axis=-1, keepdims=True)
+    along = normalize(reach)
+    d = np.clip(distance, abs(_THIGH - _SHIN) + 1e-9, _THIGH + _SHIN)
+    # law of cosines: how far along the line, and how far in front of it, the knee stands
+    a = (d**2 + _THIGH**2 - _SHIN**2) / (2.0 * d)
+    out = np.sqrt(np.maximum(_THIGH**2 - a**2, 0.0))
+    pole = normalize(forward - np.sum(forward * along, axis=-1, keepdims=True) * along)
+    knee = a * along + out * pole
+    ankle = d * along
+    return _bone(-knee, forward), _bone(knee - ankle, forward)
+
+
+def _turned(R_hips: Array) -> Array:
+    return np.asarray((R_hips[..., None, :, :] @ _SOCKETS[..., None])[..., 0])
+
+
+def _bone(up: Array, forward: Array) -> Array:
+    """The frame whose Y is the bone's upward direction and whose Z is nearest to forward."""
+    y = normalize(up)
+    x = normalize(np.cross(y, forward))
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
