@@ -58,10 +58,7 @@ def bones(p: Array, R: Array) -> list[tuple[Array, Array, float, tuple]]:
         out.append((p[parent], p[joint], THICKNESS_M.get(Joint(joint), 0.085), colour))
     for toes in (Joint.LEFT_TOES, Joint.RIGHT_TOES):
         out.append((p[toes], p[toes] + R[toes] @ TOE_TIP, 0.07, PREDICTED))
-    skull = (
-        p[Joint.HEAD] + R[Joint.HEAD] @ np.array([[0.0, 0.06, 0.02], [0.0, 0.12, 0.02]])[..., None]
-    )
-    skull = skull if skull.ndim == 2 else skull[..., 0]
+    skull = [p[Joint.HEAD] + R[Joint.HEAD] @ np.array([0.0, y, 0.03]) for y in (0.06, 0.12)]
     out.append((skull[0], skull[1], 0.19, TRACKED))
     return out
 
