@@ -1,0 +1,96 @@
+"""Both legs of a tick: the network's pose, the contact lock, the floor, and IK for both."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lobstr_hw.contact import ContactLock, LockSettings, follow, release, toe_target
+from lobstr_hw.floor import FootShape, above_floor, toes_on_floor
+from lobstr_hw.ik.jacobian import LegBones, LegPose, solve_legs
+from lobstr_hw.ik.vectors import length, rotate
+from lobstr_hw.predictors.predictor import Bools
+from lobstr_hw.rotations import Array
+from lobstr_hw.skeleton import Body, Joint
+
+__all__ = ["LegBody", "TrackedFeet", "pose_legs"]
+
+UPPER = [Joint.LEFT_UPPER_LEG, Joint.RIGHT_UPPER_LEG]
+LOWER = [Joint.LEFT_LOWER_LEG, Joint.RIGHT_LOWER_LEG]
+FEET = [Joint.LEFT_FOOT, Joint.RIGHT_FOOT]
+TOES = [Joint.LEFT_TOES, Joint.RIGHT_TOES]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LegBody:
+    """What the legs need to know of a body in the standard size.
+
+    Attributes:
+        hip: upper-leg joints in the hips (n, 2, 3).
+        bones: of the legs.
+        reach_m: hip joint to toe base, stretched (n, 2).
+        shape: of the feet.
+    """
+
+    hip: Array
+    bones: LegBones
+    reach_m: Array
+    shape: FootShape
+
+    @staticmethod
+    def of(body: Body) -> "LegBody":
+        """Of a body in the standard size."""
+        bones = LegBones(body.offsets[:, LOWER], body.offsets[:, FEET], body.offsets[:, TOES])
+        reach = length(bones.upper) + length(bones.lower) + length(bones.foot)
+        return LegBody(body.offsets[:, UPPER], bones, reach[..., 0], FootShape.of(body))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedFeet:
+    """Feet that trackers see: ankles (n, 2, 3), rotations (n, 2, 3, 3), which are valid (n, 2)."""
+
+    p: Array
+    R: Array
+    valid: Bools
+
+
+def pose_legs(
+    body: LegBody,
+    lock: ContactLock,
+    network: LegPose,
+    p_hip: Array,
+    contact: Array,
+    tracked: TrackedFeet | None,
+    dt_s: Array,
+    settings: LockSettings,
+) -> tuple[ContactLock, LegPose, Array]:
+    """The legs to be shown at a tick.
+
+    Args:
+        body: sizes.
+        lock: state of the contact lock at the last tick.
+        network: the legs as predicted, under the measured hips.
+        p_hip: upper-leg joints in the world (n, 2, 3).
+        contact: probability at the newest grid step (n, 2).
+        tracked: feet with trackers of their own, never locked; None where there are no such roles.
+        dt_s: time since the last tick (n, 1).
+        settings: of the lock.
+
+    Returns:
+        The lock's new state, the pose, and the toes' world rotations (n, 2, 3, 3).
+    """
+    toe, R_foot = network.toe(p_hip, body.bones), network.foot
+    has_tracker = np.zeros_like(lock.on)
+    if tracked is not None:
+        has_tracker = tracked.valid
+        seen = tracked.valid[..., None]
+        toe = np.where(seen, tracked.p + rotate(tracked.R, body.bones.foot), toe)
+        R_foot = np.where(seen[..., None], tracked.R, R_foot)
+        lock = replace(lock, since_release_s=np.where(has_tracker, 1e6, lock.since_release_s))
+    target = toe_target(lock, toe, dt_s, settings)
+    opens = release(lock, target, toe, p_hip, contact, body.reach_m, has_tracker, settings)
+    target, R_foot, _ = above_floor(target, R_foot, body.shape)
+    lock = follow(lock, target, opens, ~has_tracker, dt_s, body.shape.ball_m, settings)
+    start = LegPose(network.upper, network.lower, R_foot)
+    pose = solve_legs(start, p_hip, body.bones, target)
+    reached = pose.toe(p_hip, body.bones)
+    return lock, pose, toes_on_floor(reached, pose.foot, body.shape)
