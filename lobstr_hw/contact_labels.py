@@ -1,9 +1,11 @@
-"""When is a foot on the floor? Labels for training and scores only, never an input (design of metrics).
+"""When is a foot on the floor? Labels for training and scores, never an input.
 
 The toe base is in contact when it is lower than 3 cm above the local floor (the lower of both feet
-over +-2 s) and slower than 25 cm/s; segments shorter than 0.1 s are taken out. The paper's own label
-(lower than 1 cm above the clip's floor) stands beside it.
+over +-2 s) and slower than 25 cm/s; segments shorter than 0.1 s are taken out. The paper's own
+label (lower than 1 cm above the clip's floor) stands beside it.
 """
+
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +32,7 @@ def contact_labels(p_toes: Array, rate_hz: float) -> Bools:
 
 
 def paper_contact_labels(p_toes: Array) -> Bools:
-    """The paper's label: the toe base less than 1 cm higher than in flat stance on the clip's floor."""
+    """The paper's label: the toe base less than 1 cm above its height in flat stance."""
     return np.asarray(p_toes[..., 1] - TOE_BASE_HEIGHT < PAPER_HEIGHT_M)
 
 
@@ -63,6 +65,6 @@ def debounced(labels: Bools, shortest: int) -> Bools:
 
 def _flip_short_runs(labels: Bools, value: bool, shortest: int) -> None:
     edges = np.flatnonzero(np.diff(labels)) + 1
-    for start, end in zip(edges[:-1], edges[1:], strict=True):
+    for start, end in pairwise(edges):
         if labels[start] == value and end - start < shortest:
             labels[start:end] = not value

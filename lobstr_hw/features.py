@@ -92,7 +92,7 @@ def reference_frame(
     Args:
         R_hips: (..., 3, 3) in the world.
         last: (..., 3, 3) the reference frame of the step before.
-        keep: (...) where ``last`` means something; there it is kept while the pelvis has no heading.
+        keep: (...) where ``last`` means something and is kept while the pelvis has no heading.
         form: ``paper`` projects the pelvis' Z on the floor; it flips when bowing beyond 90 degrees.
     """
     yaw, certainty = _yaw(R_hips, form)
@@ -133,7 +133,7 @@ def features(
         now: the points now.
         linked: (...) whether ``before`` is one step ago; False in the first frame and after a gap.
         form: ``v1`` or ``paper``.
-        scale: (...) the user's scale s; used by ``paper`` only, which scales nothing but the height.
+        scale: (...) the user's scale s; for ``paper`` only, which scales nothing but the height.
     """
     if form == "v1":
         v, omega = _world_deltas(before, now)

@@ -1,4 +1,4 @@
-"""LoBSTR: the lower body from four points, by a GRU stepped once per grid time (Yang et al. 2021)."""
+"""LoBSTR: the lower body from four points, by a GRU stepped once per grid time."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from lobstr_hw.features import POINT_ROLES, Form, Points, features, reference_frame
 from lobstr_hw.lower_body import pose_from_6d
-from lobstr_hw.predictors.predictor import Frame, ModelCard, Prediction, State
+from lobstr_hw.predictors.predictor import Bools, Frame, ModelCard, Prediction, State
 from lobstr_hw.predictors.weights import Network
 from lobstr_hw.rotations import Array, heading
 from lobstr_hw.skeleton import Body, Joint
@@ -82,7 +82,7 @@ class Lobstr:
         }
 
 
-def frame_points(frame: Frame, R_ref_before: Array, started: Array, form: Form) -> Points:
+def frame_points(frame: Frame, R_ref_before: Array, started: Bools, form: Form) -> Points:
     """The four points of a frame, in the order of the features."""
     order = [frame.index(role) for role in POINT_ROLES]
     R = frame.R[:, order]

@@ -99,7 +99,10 @@ class Predictor(Protocol):
     or an object. Arrays have a leading axis of n people.
     """
 
-    card: ModelCard
+    @property
+    def card(self) -> ModelCard:
+        """What it is and needs."""
+        ...
 
     def start(self, body: Body) -> State:
         """The state before the first frame; per-user terms are computed here, once."""

@@ -1,8 +1,8 @@
 """Weights on disk: NAME.onnx beside its card NAME.json. Never a pickle.
 
-The graph is one step of the network: x (n, 37), h (n, H) -> h', pose (n, 48), contact (n, 4). Whatever
-else a step needs (mean, scale, joint order, versions) is on the card. A file that disagrees with
-the code is refused with the reason.
+The graph is one step of the network: x (n, 37), h (n, H) -> h', pose (n, 48), contact (n, 4).
+Whatever else a step needs (mean, scale, joint order, versions) is on the card. A file that
+disagrees with the code is refused with the reason.
 """
 
 import json

@@ -1,11 +1,12 @@
 """Errors of made trackers, so that the network has seen worse than clean captures.
 
 The paper adds Gaussian offsets of 0.01 m and turns of up to 1.5 degrees and calls them the drift of
-Lighthouse tracking. White in every frame, 1 cm is a false speed of half a metre per second; the same
-magnitudes as slowly varying drift are the default here (docs/decisions.md).
+Lighthouse tracking. White in every frame, 1 cm is a false speed of half a metre per second; the
+same magnitudes as slowly varying drift are the default here (docs/decisions.md).
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -52,7 +53,7 @@ def _drift(shape: tuple[int, ...], decay: float, rng: np.random.Generator) -> Ar
     """A stationary first-order process of variance 1 along the first axis; decay 0 is white."""
     out = rng.standard_normal(shape)
     fresh = np.sqrt(1.0 - decay**2)
-    for before, now in zip(out[:-1], out[1:], strict=True):
+    for before, now in pairwise(out):
         now *= fresh
         now += decay * before
     return out

@@ -1,6 +1,6 @@
 """Clips as flat arrays, and the windows that are drawn from them."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from lobstr_hw.features import (
 )
 from lobstr_hw.lower_body import mirror_pose_6d, pose_6d, true_lower_body
 from lobstr_hw.motion import Motion
+from lobstr_hw.rotations import Array
 from lobstr_hw.skeleton import Joint
 from lobstr_hw.training.augmentation import Augmentation, add_tracker_errors
 from lobstr_hw.training.config import TrainingConfig
@@ -123,7 +124,7 @@ def load_clips(path: Path) -> Clips:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Statistics:
-    """Mean and deviation of the input, mean of the output, share of contacts; over the training clips."""
+    """Of the training clips: input mean and deviation, output mean, share of contacts."""
 
     input_mean: Float32
     input_scale: Float32
@@ -134,13 +135,8 @@ class Statistics:
 def statistics(clips: Clips, config: TrainingConfig) -> Statistics:
     """Of the undisturbed clips, with their mirror images when these are trained on."""
     starts = zip(clips.start[:-1], clips.start[1:], strict=True)
-    x = np.concatenate(
-        [
-            clip_features(clip_points(clips.p[a:b], clips.R[a:b]), config.feature_form)
-            for a, b in starts
-        ]
-    )
-    pose, contact = clips.pose, _labels(clips, config)
+    x = np.concatenate([_clip_features(clips, a, b, config.feature_form) for a, b in starts])
+    pose, contact = clips.pose.astype(np.float64), _labels(clips, config)
     if config.mirror:
         x = np.concatenate([x, mirror_features(x)])
         pose = np.concatenate([pose, mirror_pose_6d(pose)])
@@ -148,9 +144,14 @@ def statistics(clips: Clips, config: TrainingConfig) -> Statistics:
     return Statistics(
         input_mean=x.mean(axis=0).astype(np.float32),
         input_scale=np.maximum(x.std(axis=0), SMALLEST_DEVIATION).astype(np.float32),
-        output_mean=pose.mean(axis=0, dtype=np.float64).astype(np.float32),
+        output_mean=pose.mean(axis=0).astype(np.float32),
         contact_mean=contact.mean(axis=0).astype(np.float32),
     )
+
+
+def _clip_features(clips: Clips, first: int, end: int, form: Form) -> Array:
+    p, R = clips.p[first:end].astype(np.float64), clips.R[first:end].astype(np.float64)
+    return clip_features(clip_points(p, R, form=form), form)
 
 
 def _labels(clips: Clips, config: TrainingConfig) -> Bools:
@@ -200,7 +201,7 @@ def _window_features(
     form: Form,
     augmentation: Augmentation,
     rng: np.random.Generator,
-) -> npt.NDArray[np.float64]:
+) -> Array:
     """Features (n, window, 37) of frames (n, window + 1)."""
     time_first = frames.T
     p, R = clips.p[time_first].astype(np.float64), clips.R[time_first].astype(np.float64)
@@ -212,13 +213,13 @@ def _window_features(
 
 
 def _some_mirrored(windows: Windows, which: Bools) -> Windows:
-    def either(values: npt.NDArray[np.float32], other: npt.NDArray[np.float64]) -> Float32:
+    def either(values: Float32, mirror: Callable[[Array], Array]) -> Float32:
         at = which.reshape(-1, *(1,) * (values.ndim - 1))
-        return np.where(at, other, values).astype(np.float32)
+        return np.where(at, mirror(values.astype(np.float64)), values).astype(np.float32)
 
     return Windows(
-        either(windows.x, mirror_features(windows.x)),
-        either(windows.pose, mirror_pose_6d(windows.pose)),
-        either(windows.pose_before, mirror_pose_6d(windows.pose_before)),
+        either(windows.x, mirror_features),
+        either(windows.pose, mirror_pose_6d),
+        either(windows.pose_before, mirror_pose_6d),
         np.where(which[:, None], windows.contact[:, ::-1], windows.contact),
     )

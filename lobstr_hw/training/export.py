@@ -6,6 +6,7 @@ engine loads them (constant folding), which halves the file; what that costs is 
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -76,7 +77,7 @@ def _model(network: LobstrNetwork) -> onnx.ModelProto:
         "lobstr_step",
         [_value("x", INPUT_SIZE), _value("h", hidden)],
         [_value("h_next", hidden), _value("pose", POSE_SIZE), _value("contact", CONTACT_SIZE)],
-        [*stored, numpy_helper.from_array(np.float32(1.0), "one")],
+        [*stored, numpy_helper.from_array(np.array(1.0, dtype=np.float32), "one")],
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)])
     model.ir_version = IR_VERSION
@@ -91,7 +92,7 @@ def _value(name: str, size: int) -> onnx.ValueInfoProto:
 def _weights(network: LobstrNetwork) -> dict[str, Float32]:
     """Every matrix as (in, out), so that a step is x @ W + b."""
     gru = network.gru
-    tensors = {
+    tensors: dict[str, Any] = {
         "W_x": gru.weight_ih_l0.T,
         "b_x": gru.bias_ih_l0,
         "W_h": gru.weight_hh_l0.T,
@@ -99,7 +100,7 @@ def _weights(network: LobstrNetwork) -> dict[str, Float32]:
         "W_latent": network.latent.weight.T,
         "b_latent": network.latent.bias,
         "W_pose": network.pose.weight.T,
-        "b_pose": network.pose.bias + network.output_mean,
+        "b_pose": torch.add(network.pose.bias, network.output_mean),
         "W_contact": network.contact.weight.T,
         "b_contact": network.contact.bias,
     }
@@ -109,7 +110,7 @@ def _weights(network: LobstrNetwork) -> dict[str, Float32]:
 def _cell_nodes() -> list[onnx.NodeProto]:
     """The GRU of torch: h' = (1 - z) n + z h, n = tanh(x_n + r (h W + b)_n)."""
 
-    def node(op: str, inputs: str, outputs: str, **attributes: int) -> onnx.NodeProto:
+    def node(op: str, inputs: str, outputs: str, **attributes: Any) -> onnx.NodeProto:
         return helper.make_node(op, inputs.split(), outputs.split(), **attributes)
 
     return [

@@ -1,7 +1,7 @@
 """The four losses of the paper (section 3.3), as printed.
 
-The paper does not say how its norms are averaged. Here: the mean over the batch and, for the L1 norm,
-over the 48 numbers; for the L2 norms, of the two toe bases' distances in metres.
+The paper does not say how its norms are averaged. Here: the mean over the batch and, for the L1
+norm, over the 48 numbers; for the L2 norms, of the two toe bases' distances in metres.
 """
 
 from dataclasses import dataclass
