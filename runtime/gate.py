@@ -1,0 +1,151 @@
+"""Is this pose believable? What is not never reaches the history; the role then holds its last pose.
+
+Limits are generous: they stop what no body can do, not what is merely odd.
+"""
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from lobstr_hw.rotations import Array
+from lobstr_hw.trackers import TrackerRole, TrackerSample
+
+__all__ = ["Gate", "Verdict"]
+
+SPEED_LIMIT_M_S = {
+    TrackerRole.HEAD: 8.0,
+    TrackerRole.PELVIS: 8.0,
+    TrackerRole.CHEST: 8.0,
+}
+HAND_SPEED_LIMIT_M_S = 20.0
+"""A fast pitch leaves the hand at some 40 m/s, a punch at 10; feet kick at 20."""
+TURN_LIMIT_RAD_S = 45.0
+"""The wrist's twist peaks near 40 rad/s in a racket serve."""
+STEP_ALLOWED_M = 0.05
+TURN_ALLOWED_RAD = 0.35
+"""Beyond what the speed allows: jitter, and lever arms on a quick twist."""
+
+REACH_M = {TrackerRole.PELVIS: 1.3}
+"""From the headset; a person of 1.95 m has 0.75 m between the two, and mounts add up to 0.3."""
+
+SETTLE_S = 0.2
+"""A new place is believed after the tracker has stayed consistent there for so long."""
+FRESH_S = 0.3
+"""Only a head pose this young says what is in reach of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Whether a sample may be used, and if not, why (a short name, counted as a gate event)."""
+
+    believed: bool
+    reason: str = ""
+
+
+_GOOD = Verdict(True)
+
+
+@dataclass(slots=True)
+class _Seen:
+    """One pose that was taken for true (or is being watched)."""
+
+    time_s: float
+    p: list[float] | None
+    R: Array
+
+    def could_become(self, other: "_Seen", speed_limit_m_s: float) -> str:
+        """Why a body part cannot get from here to there; empty if it can."""
+        dt = other.time_s - self.time_s
+        if self.p is not None and other.p is not None:
+            if math.dist(self.p, other.p) > STEP_ALLOWED_M + speed_limit_m_s * dt:
+                return "jump"
+        turn = TURN_ALLOWED_RAD + TURN_LIMIT_RAD_S * dt
+        # trace(A^T B) = 1 + 2 cos(angle)
+        if turn < math.pi and np.vdot(self.R, other.R) < 1.0 + 2.0 * math.cos(turn):
+            return "spin"
+        return ""
+
+
+class Gate:
+    """Judges samples role by role.
+
+    Attributes:
+        events: how often each reason occurred; a run of bad samples of one role counts once.
+    """
+
+    def __init__(self) -> None:
+        """Nothing seen yet."""
+        self.events: Counter[str] = Counter()
+        self._good: dict[TrackerRole, _Seen] = {}
+        self._new_place: dict[TrackerRole, tuple[float, _Seen]] = {}
+        self._last_reason: dict[TrackerRole, str] = {}
+
+    def judge(self, role: TrackerRole, sample: TrackerSample) -> Verdict:
+        """Decide on the next sample of a role; samples come oldest first."""
+        reason = self._fault(role, sample)
+        if reason and self._last_reason.get(role, "") != reason:
+            self.events[reason] += 1
+        self._last_reason[role] = reason
+        return Verdict(False, reason) if reason else _GOOD
+
+    def _fault(self, role: TrackerRole, sample: TrackerSample) -> str:
+        if not sample.tracked:
+            self._new_place.pop(role, None)
+            return "untracked"
+        p, R = sample.T_world_tracker.p, sample.T_world_tracker.R
+        fault = _malformed(p, R)
+        if fault:
+            return fault
+        seen = _Seen(sample.time_s, None if p is None else p.tolist(), R)
+        return self._out_of_reach(role, seen) or self._implausible(role, seen)
+
+    def _out_of_reach(self, role: TrackerRole, seen: _Seen) -> str:
+        head = self._good.get(TrackerRole.HEAD)
+        reach = REACH_M.get(role)
+        if reach is None or head is None or head.p is None or seen.p is None:
+            return ""
+        if seen.time_s - head.time_s > FRESH_S or math.dist(head.p, seen.p) <= reach:
+            return ""
+        return "out_of_reach"
+
+    def _implausible(self, role: TrackerRole, seen: _Seen) -> str:
+        limit = SPEED_LIMIT_M_S.get(role, HAND_SPEED_LIMIT_M_S)
+        good = self._good.get(role)
+        fault = good.could_become(seen, limit) if good else ""
+        if fault and not self._settled(role, seen, limit):
+            return fault
+        self._new_place.pop(role, None)
+        self._good[role] = seen
+        return ""
+
+    def _settled(self, role: TrackerRole, seen: _Seen, limit: float) -> bool:
+        """Whether the tracker has been consistent in its new place for long enough."""
+        since_s, before = self._new_place.get(role, (seen.time_s, seen))
+        if before.could_become(seen, limit):
+            since_s = seen.time_s
+        self._new_place[role] = (since_s, seen)
+        return seen.time_s - since_s >= SETTLE_S
+
+
+def _malformed(p: Array | None, R: Array) -> str:
+    """What is wrong with the numbers themselves."""
+    rows: list[list[float]] = R.tolist()
+    total = sum(map(sum, rows)) + (0.0 if p is None else float(p[0] + p[1] + p[2]))
+    if not math.isfinite(total):
+        return "nonfinite"
+    if p is not None and not p.any() and rows == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]:
+        return "zero_pose"  # what a lost device says
+    return "" if _is_rotation(*rows) else "not_a_rotation"
+
+
+def _is_rotation(x: list[float], y: list[float], z: list[float]) -> bool:
+    cross = (
+        x[1] * y[2] - x[2] * y[1],
+        x[2] * y[0] - x[0] * y[2],
+        x[0] * y[1] - x[1] * y[0],
+    )
+    square = sum(v * v for v in x), sum(v * v for v in y)
+    right = abs(sum(a * b for a, b in zip(x, y, strict=True))) < 1e-3
+    return right and all(abs(s - 1.0) < 1e-3 for s in square) and math.dist(cross, z) < 1e-3

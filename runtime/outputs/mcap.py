@@ -1,0 +1,59 @@
+"""``mcap:FILE``: a tracker log with the skeleton in it; Foxglove and Rerun open it as it is."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from lobstr_hw.drivers.tracker_log.writer import TrackerLogWriter
+from lobstr_hw.errors import LogFileError, OutputError
+from lobstr_hw.skeleton import Body
+from lobstr_hw.skeleton_pose import SkeletonPose
+from lobstr_hw.trackers import TrackerRole, TrackerSample
+
+__all__ = ["McapOutput"]
+
+
+class McapOutput:
+    """Samples as the drivers gave them, before any maths, and the skeleton of every tick."""
+
+    def __init__(self, path: Path, role_of: Callable[[str], TrackerRole | None]) -> None:
+        """Choose the file.
+
+        Args:
+            path: to write.
+            role_of: the role of a serial at this moment, if it has one.
+        """
+        self.path = path
+        self._role_of = role_of
+        self._writer: TrackerLogWriter | None = None
+        self._roles: dict[str, TrackerRole] = {}
+
+    def open(self, body: Body, rate_hz: float, take: str) -> None:
+        """Create the file."""
+        try:
+            self._writer = TrackerLogWriter(self.path)
+        except LogFileError as error:
+            raise OutputError(str(error)) from error
+        self._writer.metadata("take", {"name": take, "rate_hz": f"{rate_hz:g}"})
+
+    def calibrated(self, body: Body) -> None:
+        """Nothing to do: transforms are written as they are."""
+
+    def send(self, pose: SkeletonPose, samples: Sequence[TrackerSample]) -> None:
+        """The samples of a tick, a role where it is new, then the skeleton."""
+        assert self._writer is not None
+        for sample in samples:
+            self._note_role(self._writer, sample)
+        self._writer.add_samples(samples)
+        self._writer.add_skeleton(pose)
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._writer is not None:
+            self._writer.close()
+            self._writer = None
+
+    def _note_role(self, writer: TrackerLogWriter, sample: TrackerSample) -> None:
+        role = self._role_of(sample.serial)
+        if role is not None and self._roles.get(sample.serial) != role:
+            self._roles[sample.serial] = role
+            writer.add_state(sample.serial, role, sample.state, sample.tracked, sample.time_s)
