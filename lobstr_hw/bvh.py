@@ -15,7 +15,7 @@ from lobstr_hw.bvh_writer import hierarchy, motion_line, write_bvh
 from lobstr_hw.errors import MotionFileError
 from lobstr_hw.rotations import Array
 
-__all__ = ["Bvh", "hierarchy", "motion_line", "read_bvh", "write_bvh"]
+__all__ = ["Bvh", "hierarchy", "motion_line", "read_bvh", "read_skeleton", "write_bvh"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +52,18 @@ class Bvh:
         return p, R
 
 
+def read_skeleton(path: str | Path) -> tuple[tuple[str, ...], Array]:
+    """Names (J) and offsets (J, 3) alone; zero where position channels replace the offset.
+
+    Raises:
+        MotionFileError: as :func:`read_bvh`.
+    """
+    layout = _parse_hierarchy(_read_text(Path(path)).partition("MOTION")[0], Path(path))
+    offsets = np.array(layout.offsets)
+    offsets[[joint for joint, word in layout.channels if word.endswith("position")]] = 0.0
+    return tuple(layout.names), offsets
+
+
 @dataclass(slots=True)
 class _Layout:
     """What the hierarchy says; ``channels`` are (joint, word) in the order of the numbers."""
@@ -69,11 +81,7 @@ def read_bvh(path: str | Path) -> Bvh:
         MotionFileError: the file is missing or no BVH; the message names the line.
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise MotionFileError(f"{path}: cannot be read ({error}). Check the path.") from error
-    head, found, motion = text.partition("MOTION")
+    head, found, motion = _read_text(path).partition("MOTION")
     if not found:
         raise MotionFileError(
             f"{path}: no MOTION section in {head.count(chr(10)) + 1} lines. Is this a whole BVH file?"
@@ -88,6 +96,13 @@ def read_bvh(path: str | Path) -> Bvh:
             "'Frame Time:'. Export the clip again."
         )
     return _assemble(layout, values, frame_time_s)
+
+
+def _read_text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise MotionFileError(f"{path}: cannot be read ({error}). Check the path.") from error
 
 
 def _parse_hierarchy(head: str, path: Path) -> _Layout:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lobstr_hw.retargeting.evidence import Evidence, gather
+from lobstr_hw.retargeting.evidence import LEAST_WALK_S, RATE_HZ, Bools, Evidence, gather
 from lobstr_hw.retargeting.source import LEGS, SourceClip
 from lobstr_hw.rotations import Array, heading, normalize, rotation_mean, transpose
 from lobstr_hw.skeleton import PARENTS, STANDARD_OFFSETS, Joint
@@ -24,6 +24,7 @@ _ARMS = (
     (Joint.RIGHT_SHOULDER, Joint.RIGHT_UPPER_ARM, Joint.RIGHT_LOWER_ARM, Joint.RIGHT_HAND),
 )
 _BENT = np.radians(25.0)
+_LEAST_FLAT = 8  # frames
 _ANKLE_DROP = -float(STANDARD_OFFSETS[Joint.LEFT_TOES, 1])
 
 
@@ -45,23 +46,30 @@ class CanonicalFrames:
     notes: tuple[str, ...] = ()
 
 
-def fit_frames(clips: Sequence[SourceClip]) -> CanonicalFrames:
+def fit_frames(
+    clips: Sequence[SourceClip], others: CanonicalFrames | None = None
+) -> CanonicalFrames:
     """Fit the canonical frames of one subject on one rig.
 
     Args:
         clips: of this subject, all on the same rig.
+        others: fitted from everybody on this rig: stands in, before the zero pose, for what these
+            clips show too little of.
     """
     mapped = clips[0].mapped
     if all(clip.standard for clip in clips):
         return CanonicalFrames(np.tile(np.eye(3), (22, 1, 1)), 0.0, mapped)
-    return _Fit(gather(clips), clips[0]).frames()
+    return _Fit(gather(clips), clips[0], others).frames()
 
 
 class _Fit:
     """The steps of one fit; each joint's frame may use the ones before it."""
 
-    def __init__(self, evidence: Evidence, clip: SourceClip) -> None:
+    def __init__(
+        self, evidence: Evidence, clip: SourceClip, others: CanonicalFrames | None
+    ) -> None:
         self.e = evidence
+        self.others = others
         self.rest = clip.p_rest
         self.mapped = clip.mapped
         self.A = np.tile(np.eye(3), (22, 1, 1))
@@ -73,8 +81,15 @@ class _Fit:
         for side in (0, 1):
             self._leg(side)
             self._arm(side)
-        lift = self._lift()
-        return CanonicalFrames(self.A, lift, self.mapped, tuple(self.notes))
+        return CanonicalFrames(self.A, self._lift(), self.mapped, tuple(self.notes))
+
+    def _instead(self, *joints: Joint) -> bool:
+        """Take these frames from everybody on this rig; False where there is nobody else."""
+        if self.others is None:
+            return False
+        for joint in joints:
+            self.A[joint] = self.others.A[joint]
+        return True
 
     def _canonical(self, joint: int) -> Array:
         return np.asarray(self.e.R[:, joint] @ self.A[joint])
@@ -84,6 +99,8 @@ class _Fit:
         return np.asarray((transpose(self.e.R[:, joint]) @ v[..., None])[..., 0])
 
     def _hips(self) -> None:
+        if self.e.walking_s < LEAST_WALK_S and self._instead(Joint.HIPS):
+            return
         line = self.e.p[:, Joint.LEFT_UPPER_LEG] - self.e.p[:, Joint.RIGHT_UPPER_LEG]
         x = _direction(self._inside(Joint.HIPS, line))
         if self.e.upright.any():
@@ -93,6 +110,8 @@ class _Fit:
         self.A[Joint.HIPS] = _frame(x=x, y=up)
 
     def _trunk(self) -> None:
+        if self.e.walking_s < LEAST_WALK_S and self._instead(*_TRUNK):
+            return
         ahead = heading(self._canonical(Joint.HIPS))
         for joint in _TRUNK:
             if joint in self.mapped:
@@ -110,28 +129,34 @@ class _Fit:
         upper, lower, foot, toes = LEGS[side]
         thigh = self.e.p[:, lower] - self.e.p[:, upper]
         shin = self.e.p[:, foot] - self.e.p[:, lower]
-        axis = self._hinge(thigh, shin, self._canonical(Joint.HIPS)[:, :, 0], f"{upper.name} knee")
-        self.A[upper] = self._along(upper, -thigh, axis)
-        self.A[lower] = self._along(lower, -shin, axis)
-        flat = self.e.flat[:, side]
+        hinge = self._hinge(thigh, shin, f"{upper.name} knee")
+        if hinge is not None or not self._instead(upper, lower):
+            axis = self._canonical(Joint.HIPS)[:, :, 0] if hinge is None else hinge
+            self.A[upper] = self._along(upper, -thigh, axis)
+            self.A[lower] = self._along(lower, -shin, axis)
+        self._foot(foot, toes, self.e.flat[:, side])
+
+    def _foot(self, foot: Joint, toes: Joint, flat: Bools) -> None:
         bone = _direction(self._inside(foot, self.e.p[:, toes] - self.e.p[:, foot]))
-        if flat.any():
-            up = self._inside(foot, np.broadcast_to(_UP, thigh.shape))[flat]
+        if flat.sum() >= _LEAST_FLAT:
+            up = self._inside(foot, np.broadcast_to(_UP, (len(flat), 3)))[flat]
             self.A[foot] = _frame(y=_direction(up), z=bone, first="y")
         else:
-            self.notes.append(f"{foot.name}: no flat stance; its frame is from the zero pose")
+            self.notes.append(f"{foot.name}: {flat.sum() / RATE_HZ:.1f} s of flat stance")
+            if self._instead(foot, toes):
+                return
             self.A[foot] = _frame(y=self.A[Joint.HIPS][:, 1], z=bone, first="y")
         self._follow(toes, self._canonical(foot), flat, foot)
 
-    def _hinge(self, upper: Array, lower: Array, otherwise: Array, name: str) -> Array:
-        """World axis (F, 3) of a hinge; NaN in frames that do not show it."""
+    def _hinge(self, upper: Array, lower: Array, name: str) -> Array | None:
+        """World axis (F, 3) of a hinge; NaN in frames that do not show it; None if none does."""
         cross = np.cross(upper, lower)
         sine = np.linalg.norm(cross, axis=-1)
         bend = np.arctan2(sine, np.sum(upper * lower, axis=-1))
         bent = bend > _BENT
-        if bent.sum() < 15:
-            self.notes.append(f"{name} never bends: its axis is from the pelvis or the trunk")
-            return otherwise
+        if bent.sum() < RATE_HZ:
+            self.notes.append(f"{name}: bent for {bent.sum() / RATE_HZ:.1f} s")
+            return None
         return np.where(bent[:, None], normalize(cross), np.nan)
 
     def _along(self, joint: Joint, y: Array, x: Array) -> Array:
@@ -145,11 +170,15 @@ class _Fit:
         forearm = self.e.p[:, hand] - self.e.p[:, lower]
         chest = self._canonical(Joint.UPPER_CHEST)
         # arms hang: an elbow's axis points to the side then, and up in the T-pose
-        axis = self._hinge(out * forearm, arm, out * chest[:, :, 0], f"{upper.name} elbow")
-        for joint, bone in ((upper, arm), (lower, forearm)):
-            x = _direction(self._inside(joint, out * bone))
-            y = _direction(self._inside(joint, axis))
-            self.A[joint] = _frame(x=x, y=y)
+        hinge = self._hinge(out * forearm, arm, f"{upper.name} elbow")
+        if hinge is not None or not self._instead(upper, lower):
+            axis = out * chest[:, :, 0] if hinge is None else hinge
+            for joint, bone in ((upper, arm), (lower, forearm)):
+                x = _direction(self._inside(joint, out * bone))
+                y = _direction(self._inside(joint, axis))
+                self.A[joint] = _frame(x=x, y=y)
+        if self.e.walking_s < LEAST_WALK_S and self._instead(hand, shoulder):
+            return
         self._follow(hand, self._canonical(lower), self.e.upright, lower)
         if shoulder in self.mapped:
             self._follow(shoulder, chest, self.e.upright, Joint.UPPER_CHEST)
@@ -160,7 +189,9 @@ class _Fit:
             for side, (_, _, foot, toes) in enumerate(LEGS)
         ]
         both = np.concatenate(drops)
-        return _ANKLE_DROP - float(np.median(both)) if len(both) else 0.0
+        if len(both) < _LEAST_FLAT:
+            return self.others.lift if self.others else 0.0
+        return _ANKLE_DROP - float(np.median(both))
 
 
 def _direction(v: Array) -> Array:

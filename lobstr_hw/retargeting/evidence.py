@@ -10,13 +10,13 @@ from lobstr_hw.retargeting.source import LEGS, SourceClip
 from lobstr_hw.rotations import Array, normalize
 from lobstr_hw.skeleton import Joint
 
-__all__ = ["Evidence", "flat_stance", "gather", "speed"]
+__all__ = ["Bools", "Evidence", "LEAST_WALK_S", "RATE_HZ", "flat_stance", "gather", "speed"]
 
 Bools = npt.NDArray[np.bool_]
 
-_RATE_HZ = 15.0  # poses further apart than this say nothing new
+RATE_HZ = 15.0  # poses further apart than this say nothing new
 _WALK_M_S = (0.4, 2.2)
-_LEAST_WALK_S = 3.0
+LEAST_WALK_S = 3.0
 _LEAST_UPRIGHT_S = 0.5
 _STILL_M_S = 0.15
 _FLAT_M = 0.020
@@ -32,6 +32,7 @@ class Evidence:
         R: (F, 22, 3, 3) the rig's frames.
         upright: (F,) walking forward upright, or standing where there is too little walking.
         flat: (F, 2) a foot stands flat and still.
+        walking_s: seconds of walking forward upright.
         notes: what there was too little of.
     """
 
@@ -39,6 +40,7 @@ class Evidence:
     R: Array
     upright: Bools
     flat: Bools
+    walking_s: float
     notes: tuple[str, ...]
 
 
@@ -57,16 +59,14 @@ def gather(clips: Sequence[SourceClip]) -> Evidence:
     p, R, flat, forward, height = (np.concatenate(column) for column in zip(*parts, strict=True))
     tall = height > 0.94 * np.percentile(height, 95.0)
     walking, notes = tall & forward, []
-    if walking.sum() < _LEAST_WALK_S * _RATE_HZ:
-        notes.append(
-            f"{walking.sum() / _RATE_HZ:.1f} s of walking upright: "
-            "pelvis, trunk and head are from all upright poses"
-        )
+    walking_s = float(walking.sum() / RATE_HZ)
+    if walking_s < LEAST_WALK_S:
+        notes.append(f"{walking_s:.1f} s of walking upright")
         walking = tall & _looks_upright(p)
-    if walking.sum() < _LEAST_UPRIGHT_S * _RATE_HZ:
-        notes.append("no upright pose: pelvis, trunk and head are from the zero pose")
+    if walking.sum() < _LEAST_UPRIGHT_S * RATE_HZ:
+        notes.append("no upright pose")
         walking = np.zeros_like(walking)
-    return Evidence(p, R, walking, flat, tuple(notes))
+    return Evidence(p, R, walking, flat, walking_s, tuple(notes))
 
 
 def _part(clip: SourceClip) -> tuple[Array, Array, Bools, Bools, Array]:
@@ -78,7 +78,7 @@ def _part(clip: SourceClip) -> tuple[Array, Array, Bools, Bools, Array]:
     across = np.hypot(v[:, 0], v[:, 2])
     lowest = clip.p[:, [leg[3] for leg in LEGS], 1].min(axis=1)
     forward = (along > 0.85 * across) & (along > _WALK_M_S[0]) & (along < _WALK_M_S[1])
-    thin = slice(0, None, max(1, round(clip.rate_hz / _RATE_HZ)))
+    thin = slice(0, None, max(1, round(clip.rate_hz / RATE_HZ)))
     flat = flat_stance(clip)
     return clip.p[thin], clip.R[thin], flat[thin], forward[thin], (centre[:, 1] - lowest)[thin]
 

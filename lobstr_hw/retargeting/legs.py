@@ -10,6 +10,7 @@ __all__ = ["solve_legs"]
 
 _THIGH = -float(STANDARD_OFFSETS[Joint.LEFT_LOWER_LEG, 1])
 _SHIN = -float(STANDARD_OFFSETS[Joint.LEFT_FOOT, 1])
+_STRAIGHT, _BENT = np.sin(np.radians([10.0, 35.0]))
 _REACH = 0.9995
 """Of thigh and shin: at the full length the knee's place would have an infinite slope."""
 
@@ -17,8 +18,9 @@ _REACH = 0.9995
 def solve_legs(R_local: Array, p_hips: Array, p_toes: Array) -> Array:
     """Turn thighs and shins so that the toe bases are met; feet keep their world rotation.
 
-    The knee stays in the plane that the thigh's X axis is normal to. Where the toe base is out of
-    reach the leg is straight towards it.
+    The knee stays in its plane and becomes a pure hinge: some rigs twist the shin by up to 15
+    degrees while they bend it, which no tracker could tell and no toe shows. Where the toe base is
+    out of reach the leg is straight towards it.
 
     Args:
         R_local: (F, 22, 3, 3) of the standard skeleton.
@@ -35,8 +37,7 @@ def solve_legs(R_local: Array, p_hips: Array, p_toes: Array) -> Array:
         d = np.linalg.norm(to_ankle, axis=-1)
         d = np.clip(d, abs(_THIGH - _SHIN) + 1e-4, _REACH * (_THIGH + _SHIN))
         ahead = normalize(to_ankle)
-        # the knee is on the side to which the hinge (X) opens: hinge x leg
-        x = R[:, upper, :, 0]
+        x = _hinge(p, R, side)
         x = normalize(x - np.sum(x * ahead, axis=-1, keepdims=True) * ahead)
         front = np.cross(ahead, x)
         along = (_THIGH**2 - _SHIN**2 + d**2) / (2.0 * d)
@@ -44,8 +45,21 @@ def solve_legs(R_local: Array, p_hips: Array, p_toes: Array) -> Array:
         p_knee = p[:, upper] + along[:, None] * ahead + aside[:, None] * front
         p_end = p[:, upper] + d[:, None] * ahead
         R[:, upper] = _bone(p[:, upper] - p_knee, x)
-        R[:, lower] = _bone(p_knee - p_end, R[:, lower, :, 0])
+        R[:, lower] = _bone(p_knee - p_end, x)
     return local_rotations(R)
+
+
+def _hinge(p: Array, R: Array, side: int) -> Array:
+    """The knee's axis: normal to thigh and shin where it is bent, between their frames' X before."""
+    upper, lower, foot, _ = LEGS[side]
+    normal = np.cross(p[:, lower] - p[:, upper], p[:, foot] - p[:, lower])
+    sine = np.linalg.norm(normal, axis=-1, keepdims=True) / (_THIGH * _SHIN)
+    # a normal is a good axis from 35 degrees on and noise under 10
+    w = np.clip((sine - _STRAIGHT) / (_BENT - _STRAIGHT), 0.0, 1.0)
+    frames = normalize(R[:, upper, :, 0] + R[:, lower, :, 0])
+    # hyperextended or flipped knees: the frames know which side is the front
+    normal *= np.where(np.sum(normal * frames, axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
+    return normalize((1.0 - w) * frames + w * normalize(normal))
 
 
 def _bone(y: Array, x: Array) -> Array:

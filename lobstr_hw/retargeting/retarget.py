@@ -1,6 +1,5 @@
 """Clips of any rig onto the standard skeleton, at 45 Hz, on a floor at y = 0 (docs/retargeting.md)."""
 
-import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -13,7 +12,7 @@ from lobstr_hw.retargeting.cuts import good_pieces
 from lobstr_hw.retargeting.floor import floor_height
 from lobstr_hw.retargeting.legs import solve_legs
 from lobstr_hw.retargeting.resample import resample_points, resample_rotations, resample_times
-from lobstr_hw.retargeting.source import LEGS, SourceClip, load_source
+from lobstr_hw.retargeting.source import LEGS, SourceClip, load_source, same_rig
 from lobstr_hw.rotations import Array
 from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint, local_rotations
 
@@ -45,7 +44,7 @@ def retarget(
     """Bring clips to the standard skeleton at 45 Hz.
 
     Canonical frames are fitted per subject and rig from the given clips themselves, so give all
-    clips of a subject in one call. The clips come out grouped by subject and rig.
+    clips of a subject in one call. The clips come out grouped by rig and subject.
 
     Args:
         clips: from :func:`lobstr_hw.retargeting.find_clips`.
@@ -68,55 +67,68 @@ def retarget(
     for clip in left_out:
         say(Note(clip.name, "left out: " + "; ".join(f.why for f in by_clip[clip.name])))
     dropped = {c.name for c in left_out}
-    groups: dict[str, list[ClipFile]] = {}
-    for clip in clips:
-        if clip.name not in dropped:
-            groups.setdefault(_group(clip), []).append(clip)
+    good = [c for c in clips if c.name not in dropped]
     done = len(left_out)
-    for members in groups.values():
-        frames = _fit_group(members, say)
-        for clip in members:
-            cuts = [f for f in by_clip.get(clip.name, ()) if f.action == "cut"]
-            yield from retarget_clip(clip, load_source(clip), frames, cuts)
-            done += 1
-            if progress:
-                progress(done, len(clips), clip.name)
+    for rig in same_rig(good):
+        whole: list[CanonicalFrames] = []
+        for members in _by_subject(rig):
+            frames = _fit(members, rig, whole, say)
+            for clip in members:
+                cuts = [f for f in by_clip.get(clip.name, ()) if f.action == "cut"]
+                yield from retarget_clip(clip, load_source(clip), frames, cuts)
+                done += 1
+                if progress:
+                    progress(done, len(clips), clip.name)
 
 
-def _group(clip: ClipFile) -> str:
-    """Clips that share canonical frames: one subject (styles apart count as one) on one rig."""
-    head = clip.path.read_bytes()[:20_000].partition(b"MOTION")[0]
-    lines = [line.split() for line in head.splitlines()]
-    # the root's offset is where the actor stood, not how the rig is made
-    shape = [w for words in lines for w in words if words[0] in (b"ROOT", b"JOINT", b"OFFSET")]
-    offsets = [i for i, w in enumerate(shape) if w == b"OFFSET"]
-    shape[offsets[0] + 1 : offsets[0] + 4] = [] if offsets else []
-    subject = clip.subject.split(";")[0]
-    return f"{clip.set_name}|{subject}|{zlib.crc32(b' '.join(shape)):08x}"
+def _by_subject(rig: Sequence[ClipFile]) -> list[list[ClipFile]]:
+    """Clips of one subject; styles of one actor ("...; style old") count as one."""
+    out: dict[str, list[ClipFile]] = {}
+    for clip in rig:
+        out.setdefault(clip.subject.split(";")[0], []).append(clip)
+    return list(out.values())
 
 
-def _fit_group(members: Sequence[ClipFile], say: Callable[[Note], None]) -> CanonicalFrames:
-    """Fit from clips spread evenly over the group, as many as are enough."""
-    sources: list[SourceClip] = []
-    budget = float(_EVIDENCE_FRAMES)
-    for clip in _spread(members):
-        source = load_source(clip)
-        sources.append(source)
-        budget -= len(source) * min(1.0, 30.0 / source.rate_hz)
-        if budget < 0.0:
-            break
+def _fit(
+    members: Sequence[ClipFile],
+    rig: Sequence[ClipFile],
+    whole: list[CanonicalFrames],
+    say: Callable[[Note], None],
+) -> CanonicalFrames:
+    """The frames of one subject; what it shows too little of comes from everybody on this rig.
+
+    Args:
+        members: clips of the subject.
+        rig: clips of everybody.
+        whole: the frames fitted from everybody, once they were needed (filled here).
+        say: called with each note.
+    """
+    sources = _evidence(members)
     frames = fit_frames(sources)
+    if frames.notes and len(members) < len(rig):
+        if not whole:
+            whole.append(fit_frames(_evidence(rig)))
+        frames = fit_frames(sources, whole[0])
+    how = "from everybody on this rig" if whole else "from the zero pose or standing poses"
     for text in frames.notes:
-        say(Note(members[0].name, f"{text} ({members[0].subject}, {len(members)} clips)"))
+        say(Note(members[0].name, f"{members[0].subject}: {text}: frames {how}"))
     if not sources[0].unit_told:
-        say(Note(members[0].name, f"unit guessed from the legs: 1.0 m is {sources[0].metres:.3f} m"))
+        say(Note(members[0].name, f"unit guessed from the legs: hips at {sources[0].metres:.2f} m"))
     return frames
 
 
-def _spread(members: Sequence[ClipFile]) -> list[ClipFile]:
-    """All members, in an order whose every beginning is spread evenly (golden ratio)."""
-    rank = [(i * 0.6180339887498949) % 1.0 for i in range(len(members))]
-    return [members[i] for i in np.argsort(np.array(rank), kind="stable")]
+def _evidence(members: Sequence[ClipFile]) -> list[SourceClip]:
+    """Clips spread evenly over the members, as many as are enough."""
+    sources: list[SourceClip] = []
+    budget = float(_EVIDENCE_FRAMES)
+    # golden ratio: every beginning of this order is spread evenly
+    rank = np.array([(i * 0.6180339887498949) % 1.0 for i in range(len(members))])
+    for i in np.argsort(rank, kind="stable"):
+        sources.append(load_source(members[i]))
+        budget -= len(sources[-1]) * min(1.0, 30.0 / sources[-1].rate_hz)
+        if budget < 0.0:
+            break
+    return sources
 
 
 def retarget_clip(
@@ -142,5 +154,5 @@ def retarget_clip(
 
 def _hips(centre: Array, R_hips: Array) -> Array:
     """The hips joint stands over the middle of the hip joints, as far as on the standard skeleton."""
-    up = -STANDARD_OFFSETS[Joint.LEFT_UPPER_LEG] * [0.0, 1.0, 1.0]
-    return np.asarray(centre + R_hips @ up)
+    over = -STANDARD_OFFSETS[Joint.LEFT_UPPER_LEG] * [0.0, 1.0, 1.0]
+    return np.asarray(centre + R_hips @ over)

@@ -1,22 +1,24 @@
 """A clip as its rig has it, brought to the 22 joints and to the standard size, frames not fitted."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from lobstr_hw.bvh import Bvh, read_bvh
+from lobstr_hw.bvh import Bvh, read_bvh, read_skeleton
 from lobstr_hw.retargeting.clips import ClipFile
 from lobstr_hw.retargeting.rigs import is_standard, match_rig
 from lobstr_hw.rotations import Array
 from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint
 
-__all__ = ["LEGS", "SourceClip", "load_source"]
+__all__ = ["LEGS", "SourceClip", "load_source", "same_rig"]
 
 LEGS = (
     (Joint.LEFT_UPPER_LEG, Joint.LEFT_LOWER_LEG, Joint.LEFT_FOOT, Joint.LEFT_TOES),
     (Joint.RIGHT_UPPER_LEG, Joint.RIGHT_LOWER_LEG, Joint.RIGHT_FOOT, Joint.RIGHT_TOES),
 )
 LEG_LENGTH = -float(STANDARD_OFFSETS[Joint.LEFT_LOWER_LEG, 1] + STANDARD_OFFSETS[Joint.LEFT_FOOT, 1])
+_SAME_SHAPE = 0.02
 _UNITS_M = (1.0, 0.01, 0.0254, 0.0254 / 0.45, 0.001)
 
 
@@ -107,3 +109,19 @@ def _leg_length(p: Array) -> float:
         for i in (0, 1)
     ]
     return float(np.sum(parts) / 2.0)
+
+
+def same_rig(clips: Sequence[ClipFile]) -> list[list[ClipFile]]:
+    """Clips of one set in lists of one rig each: the same joints, bones alike but for their unit."""
+    rigs: list[tuple[str, tuple[str, ...], Array, list[ClipFile]]] = []
+    for clip in clips:
+        names, offsets = read_skeleton(clip.path)
+        shape = offsets / max(float(np.linalg.norm(offsets)), 1e-9)
+        for set_name, known, known_shape, members in rigs:
+            alike = set_name == clip.set_name and known == names
+            if alike and np.abs(shape - known_shape).max() < _SAME_SHAPE:
+                members.append(clip)
+                break
+        else:
+            rigs.append((clip.set_name, names, shape, [clip]))
+    return [members for _, _, _, members in rigs]
