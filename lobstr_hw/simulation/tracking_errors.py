@@ -19,7 +19,7 @@ class TrackingErrors:
         jitter_m, jitter_rad: white, per sample; sub-millimetre with two stations in sight.
         drift_m, drift_rad: slow wander, deviation of an Ornstein-Uhlenbeck process.
         drift_memory_s: over which the drift forgets.
-        jumps_per_minute: reflections: the pose stands off for up to 0.2 s, said to be tracked.
+        jumps_per_minute: of each tracker; reflections: the pose stands off for up to 0.2 s, said to be tracked.
         jump_m: mean size of a jump.
         dropouts_per_minute: of each tracker; 0.1 to 1 s without sight, tracked False.
         coast_s: for so long a blind tracker goes on at its speed (fading), then it holds.
@@ -30,9 +30,9 @@ class TrackingErrors:
     drift_m: float = 0.002
     drift_rad: float = np.deg2rad(0.1)
     drift_memory_s: float = 20.0
-    jumps_per_minute: float = 0.5
+    jumps_per_minute: float = 0.3
     jump_m: float = 0.04
-    dropouts_per_minute: float = 0.7
+    dropouts_per_minute: float = 0.3
     coast_s: float = 0.1
 
     @staticmethod

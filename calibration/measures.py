@@ -1,0 +1,214 @@
+"""Body measures and levers from where four trackers are in a T-pose: the most likely ones.
+
+Everything unknown is normally distributed (priors.py), the twelve coordinates follow from it, so
+the answer is a weighted least-squares fit (Gauss-Newton, three steps: the model is nearly linear).
+What the eyes and the hands say about the stature is combined with the right weights by itself: in
+the hips' height a centimetre of the headset counts about eight times a centimetre of the span.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lobstr_hw.calibration.priors import (
+    ARM_DEVIATION,
+    BELLY_LEVER,
+    BELLY_LEVER_DEVIATION,
+    EYES_DEVIATION,
+    EYES_OF_STATURE,
+    HIPS_OF_STATURE,
+    LEG_DEVIATION,
+    POSE_DEVIATION,
+    TRUNK_DEVIATION,
+    WAND_LEVER,
+    WAND_LEVER_DEVIATION,
+)
+from lobstr_hw.poses import frozen
+from lobstr_hw.proportions import (
+    STANDARD_ARM,
+    STANDARD_TRUNK,
+    STANDARD_WIDTH,
+    body_from_measures,
+    eyes_in_head,
+)
+from lobstr_hw.rotations import Array
+from lobstr_hw.skeleton import STANDARD_OFFSETS, STATURE, Body, Joint
+
+__all__ = ["Measures", "fit_measures"]
+
+_FREE_M = 100.0  # no opinion
+_GIVEN_M = 0.005  # a stature that somebody typed in
+_MEASURED_M = np.array([0.006, 0.012, 0.012, 0.012])
+"""Of a tracker's position in the pose: tracking, sway, and the lever of a segment that is off."""
+_SHOULDER_OF_TRUNK = (
+    float(
+        sum(
+            STANDARD_OFFSETS[j, 1]
+            for j in (
+                Joint.SPINE,
+                Joint.CHEST,
+                Joint.UPPER_CHEST,
+                Joint.LEFT_SHOULDER,
+                Joint.LEFT_UPPER_ARM,
+            )
+        )
+    )
+    / STANDARD_TRUNK
+)
+_MIRROR = np.array([-1.0, 1.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measures:
+    """The most likely body and mounts.
+
+    Attributes:
+        stature_m, hips_height_m, trunk_m, arm_m, shoulders_m: see ``body_from_measures``.
+        levers: (4, 3) from joint to tracker in the T-pose, in the person's heading; FOUR_POINTS.
+        hips_height_deviation_m: how far off the hips' height may be.
+        arm_deviation_m: how far off the arms may be.
+        misfit: root mean square of all residuals over their deviations; above 2 something is odd.
+    """
+
+    stature_m: float
+    hips_height_m: float
+    trunk_m: float
+    arm_m: float
+    shoulders_m: float
+    levers: Array
+    hips_height_deviation_m: float
+    arm_deviation_m: float
+    misfit: float
+
+    def __post_init__(self) -> None:
+        """Check the shape once."""
+        object.__setattr__(self, "levers", frozen(self.levers, (4, 3)))
+
+    def body(self) -> Body:
+        """The body of these measures (n = 1)."""
+        parts = (self.hips_height_m, self.trunk_m, self.arm_m, self.shoulders_m)
+        return body_from_measures(*(np.array([part]) for part in parts))
+
+
+# the unknowns, in this order, each as its distance from the mean in deviations
+_SIZES = slice(0, 4)  # stature (metres), leg, arm, shoulders (fractions)
+_PLACE = slice(4, 6)  # of the hips on the floor
+_LEAN = slice(6, 8)  # of the back, forward and to the left
+_ARMS = slice(8, 12)  # left up, left forward, right up, right forward
+_LEVERS = slice(12, 24)
+
+
+def fit_measures(p: Array, R_head: Array, stature_m: float | None = None) -> Measures:
+    """Measure a person in a T-pose.
+
+    Args:
+        p: (4, 3) tracker positions in the order of FOUR_POINTS, in the person's heading, above the
+            floor.
+        R_head: (3, 3) how the head is held, in the person's heading.
+        stature_m: where the person knows it.
+    """
+    mean, deviation = _prior(p, stature_m)
+    weight = np.repeat(1.0 / _MEASURED_M, 3)
+    u = np.zeros(len(mean))
+    for _ in range(3):
+        at, J = _linearized(u, mean, deviation, R_head)
+        J = J * weight[:, None]
+        residual = weight * (p.ravel() - at) + J @ u
+        spread = np.linalg.inv(J.T @ J + np.eye(len(u)))
+        u = spread @ (J.T @ residual)
+    found = mean + deviation * u
+    left = weight * (p.ravel() - _trackers(found, R_head).ravel())
+    informed = deviation < _FREE_M
+    return _measures(
+        found,
+        spread * np.outer(deviation, deviation),
+        float(np.sqrt((np.sum(left**2) + np.sum(u[informed] ** 2)) / len(left))),
+    )
+
+
+def _prior(p: Array, stature_m: float | None) -> tuple[Array, Array]:
+    """Mean and deviation (24,) of the unknowns; the stature's and the place's are only starts."""
+    stature = p[0, 1] / EYES_OF_STATURE if stature_m is None else stature_m
+    mean = np.zeros(24)
+    mean[0] = stature
+    mean[_PLACE] = (p[3] - BELLY_LEVER)[[0, 2]]
+    levers = [np.zeros(3), WAND_LEVER, WAND_LEVER * _MIRROR, BELLY_LEVER]
+    mean[_LEVERS] = np.concatenate(levers)  # the headset's is counted from the eyes
+    sizes = [
+        _FREE_M if stature_m is None else _GIVEN_M,
+        LEG_DEVIATION,
+        ARM_DEVIATION,
+        ARM_DEVIATION,
+    ]
+    deviation = np.concatenate(
+        [
+            sizes,
+            np.full(2, _FREE_M),
+            np.full(2, TRUNK_DEVIATION),
+            np.full(4, POSE_DEVIATION),
+            EYES_DEVIATION,
+            WAND_LEVER_DEVIATION,
+            WAND_LEVER_DEVIATION,
+            BELLY_LEVER_DEVIATION,
+        ]
+    )
+    return mean, deviation
+
+
+def _linearized(u: Array, mean: Array, deviation: Array, R_head: Array) -> tuple[Array, Array]:
+    """The twelve coordinates at u and their derivatives (12, 24), by central differences."""
+    step_m = 1e-6 / np.minimum(deviation, 1.0)  # a micrometre (or microradian) of each unknown
+    around = u + np.concatenate([np.diag(step_m), -np.diag(step_m)])
+    values = _trackers(mean + deviation * around, R_head).reshape(len(around), -1)
+    plus, minus = np.split(values, 2)
+    at = _trackers(mean + deviation * u, R_head).ravel()
+    return at, ((plus - minus) / (2.0 * step_m[:, None])).T
+
+
+def _sizes(x: Array) -> tuple[Array, Array, Array, Array]:
+    """Hips' height, trunk, arm and shoulders (...) in metres, of unknowns x (..., 24)."""
+    stature, leg, arm, shoulders = np.moveaxis(x[..., _SIZES], -1, 0)
+    size = stature / STATURE
+    hips = HIPS_OF_STATURE * stature * (1.0 + leg)
+    trunk = EYES_OF_STATURE * stature - eyes_in_head(stature)[..., 1] - hips
+    return hips, trunk, STANDARD_ARM * size * (1.0 + arm), STANDARD_WIDTH * size * (1.0 + shoulders)
+
+
+def _trackers(x: Array, R_head: Array) -> Array:
+    """Where the four trackers (..., 4, 3) are for unknowns x (..., 24)."""
+    hips_height, trunk, arm, shoulders = _sizes(x)
+    hips = np.stack([x[..., 4], hips_height, x[..., 5]], axis=-1)
+    forward, left = np.moveaxis(x[..., _LEAN], -1, 0)
+    up = np.stack([left, np.sqrt(1.0 - forward**2 - left**2), forward], axis=-1)
+    levers = x[..., _LEVERS].reshape(*x.shape[:-1], 4, 3)
+    head = hips + trunk[..., None] * up
+    eyes = (R_head @ (eyes_in_head(x[..., 0]) + levers[..., 0, :])[..., None])[..., 0]
+    joints = [head + eyes]
+    for i, side in enumerate((1.0, -1.0)):
+        lift, ahead = x[..., 8 + 2 * i], x[..., 9 + 2 * i]
+        out = np.stack([side * np.sqrt(1.0 - lift**2 - ahead**2), lift, ahead], axis=-1)
+        shoulder = hips + _SHOULDER_OF_TRUNK * trunk[..., None] * up
+        width = side * shoulders[..., None] / 2.0 * np.array([1.0, 0.0, 0.0])
+        joints.append(shoulder + width + arm[..., None] * out + levers[..., 1 + i, :])
+    return np.stack([*joints, hips + levers[..., 3, :]], axis=-2)
+
+
+def _measures(x: Array, covariance: Array, misfit: float) -> Measures:
+    hips, trunk, arm, shoulders = (float(v) for v in _sizes(x))
+    levers = np.array(x[_LEVERS]).reshape(4, 3)
+    levers[0] += eyes_in_head(x[0])
+    # hips = 0.586 H (1 + leg) and arm = k H (1 + arm): deviations through both factors
+    by_hips = np.array([hips / x[0], hips / (1.0 + x[1])])
+    by_arm = np.array([arm / x[0], arm / (1.0 + x[2])])
+    C = covariance
+    return Measures(
+        float(x[0]),
+        hips,
+        trunk,
+        arm,
+        shoulders,
+        levers,
+        float(np.sqrt(by_hips @ C[:2, :2] @ by_hips)),
+        float(np.sqrt(by_arm @ C[np.ix_([0, 2], [0, 2])] @ by_arm)),
+        misfit,
+    )
