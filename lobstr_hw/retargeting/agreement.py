@@ -14,7 +14,7 @@ import numpy.typing as npt
 from lobstr_hw.errors import LobstrError
 from lobstr_hw.motion import Motion
 from lobstr_hw.retargeting.clips import find_clips
-from lobstr_hw.retargeting.evidence import speed
+from lobstr_hw.retargeting.speed import speed
 from lobstr_hw.retargeting.retarget import retarget
 from lobstr_hw.rotations import Array, heading, transpose
 from lobstr_hw.skeleton import Joint

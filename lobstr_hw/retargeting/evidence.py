@@ -7,16 +7,17 @@ import numpy as np
 import numpy.typing as npt
 
 from lobstr_hw.retargeting.source import LEGS, SourceClip
+from lobstr_hw.retargeting.speed import speed
 from lobstr_hw.rotations import Array, normalize
 from lobstr_hw.skeleton import Joint
 
-__all__ = ["Bools", "Evidence", "LEAST_WALK_S", "RATE_HZ", "flat_stance", "gather", "speed"]
+__all__ = ["Bools", "Evidence", "LEAST_WALK_S", "RATE_HZ", "flat_stance", "gather"]
 
 Bools = npt.NDArray[np.bool_]
 
 RATE_HZ = 15.0  # poses further apart than this say nothing new
 _WALK_M_S = (0.4, 2.2)
-LEAST_WALK_S = 3.0
+LEAST_WALK_S = 1.0  # a whole stride
 _LEAST_UPRIGHT_S = 0.5
 _STILL_M_S = 0.15
 _FLAT_M = 0.020
@@ -42,15 +43,6 @@ class Evidence:
     flat: Bools
     walking_s: float
     notes: tuple[str, ...]
-
-
-def speed(p: Array, rate_hz: float, span_s: float) -> Array:
-    """Velocity (F, ..., 3) over a centred span, shortened at the ends."""
-    k = max(1, round(span_s * rate_hz / 2.0))
-    i = np.arange(len(p))
-    a, b = np.maximum(i - k, 0), np.minimum(i + k, len(p) - 1)
-    dt = np.maximum(b - a, 1) / rate_hz
-    return np.asarray((p[b] - p[a]) / dt.reshape(-1, *(1,) * (p.ndim - 1)))
 
 
 def gather(clips: Sequence[SourceClip]) -> Evidence:

@@ -7,6 +7,7 @@ import numpy as np
 
 from lobstr_hw.bvh import Bvh, read_bvh, read_skeleton
 from lobstr_hw.retargeting.clips import ClipFile
+from lobstr_hw.retargeting.floor import floor_tilt
 from lobstr_hw.retargeting.rigs import is_standard, match_rig
 from lobstr_hw.rotations import Array
 from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint
@@ -78,6 +79,10 @@ def load_source(clip: ClipFile) -> SourceClip:
     p_rest = np.full((22, 3), np.nan)
     p_rest[columns] = _rest(bvh)[at]
     leg = _leg_length(p)
+    standard = is_standard(bvh.names)
+    if not standard:
+        level = floor_tilt(p[:, [leg_[3] for leg_ in LEGS]] * LEG_LENGTH / leg, 1.0 / bvh.frame_time_s)
+        p, R = p @ level.T, level @ R
     unit = clip.metres_per_unit or min(_UNITS_M, key=lambda u: abs(np.log(u * leg / 0.82)))
     scale = LEG_LENGTH / leg
     return SourceClip(
@@ -88,7 +93,7 @@ def load_source(clip: ClipFile) -> SourceClip:
         1.0 / bvh.frame_time_s,
         scale,
         unit / scale,
-        is_standard(bvh.names),
+        standard,
         clip.metres_per_unit is not None,
     )
 
