@@ -29,23 +29,18 @@ class Feed:
         self._history = History(len(self.roles))
         self._heard_s = dict.fromkeys(self.roles, -math.inf)
 
-    def add(self, samples: Iterable[TrackerSample]) -> list[TrackerSample]:
-        """Take in samples, oldest first.
+    def add(self, samples: Iterable[TrackerSample]) -> None:
+        """Take in samples, oldest first."""
+        for sample in samples:
+            role = self.table.of(sample.serial)
+            if role is not None and role in self._heard_s:
+                self._take(role, sample)
 
-        Returns:
-            Those that are believed and new.
-        """
-        return [sample for sample in samples if self._take(sample)]
-
-    def _take(self, sample: TrackerSample) -> bool:
-        role = self.table.of(sample.serial)
-        if role is None or role not in self._heard_s:
-            return False
+    def _take(self, role: TrackerRole, sample: TrackerSample) -> None:
         self._heard_s[role] = max(self._heard_s[role], sample.time_s)
-        if not self.gate.judge(role, sample).believed:
-            return False
-        pose = sample.T_world_tracker
-        return self._history.add(self.roles.index(role), sample.time_s, pose.p, pose.R)
+        if self.gate.judge(role, sample).believed:
+            pose = sample.T_world_tracker
+            self._history.add(self.roles.index(role), sample.time_s, pose.p, pose.R)
 
     def at(self, times_s: Sequence[float]) -> Resampled:
         """Tracker poses of all roles; where one was never heard, the pelvis' pose, not valid."""

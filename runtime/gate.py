@@ -1,4 +1,4 @@
-"""Is this pose believable? What is not never reaches the history; the role then holds its last pose.
+"""Is this pose believable? What is not never reaches the history; the role holds its last pose.
 
 Limits are generous: they stop what no body can do, not what is merely odd.
 """

@@ -10,7 +10,7 @@ __all__ = ["RoleTable"]
 
 
 class RoleTable:
-    """Serial -> role. A profile is binding; without one, role hints count, first come first served."""
+    """Serial -> role: a calibration is binding; before it, what devices say, first come first."""
 
     def __init__(
         self,
@@ -27,6 +27,11 @@ class RoleTable:
         self._devices = devices
         self._fixed = profile is not None
 
+    def bind(self, roles: Mapping[str, TrackerRole]) -> None:
+        """From now on only these trackers count."""
+        self._roles = dict(roles)
+        self._fixed = True
+
     def of(self, serial: str) -> TrackerRole | None:
         """The role of a serial, if it has one."""
         role = self._roles.get(serial)
@@ -38,19 +43,21 @@ class RoleTable:
     def require(self, roles: Collection[TrackerRole]) -> None:
         """Check the devices that are there against the roles that are needed.
 
+        Before a calibration a device that does not say what it is may be any of them.
+
         Raises:
             MissingRole: names what is missing and what was seen.
         """
         devices = self._devices()
         bound = {device.serial: self.of(device.serial) for device in devices}
         missing = [role for role in roles if role not in bound.values()]
-        if not missing:
+        open_to_any = 0 if self._fixed else list(bound.values()).count(None)
+        if len(missing) <= open_to_any:
             return
-        seen = ", ".join(f"{serial} ({role or 'no role'})" for serial, role in bound.items())
-        by = "the profile" if self._fixed else "its device"
+        seen = ", ".join(f"{role or 'no role'} ({serial})" for serial, role in bound.items())
         raise MissingRole(
-            f"no tracker is bound to {' and '.join(missing)} by {by}; seen: {seen or 'none'}. "
-            "Switch the missing tracker on, or bind it by a new profile: lobstr-calibrate."
+            f"no tracker stands for {' and '.join(missing)}; seen: {seen or 'none'}. Record again "
+            "with all four switched on, or bind them by a new profile: lobstr-calibrate."
         )
 
     def _read_hints(self) -> None:

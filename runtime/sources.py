@@ -1,13 +1,11 @@
 """Where samples come from: a log (``--sim``) or drivers (``--driver``)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
 from lobstr_hw.drivers import DRIVERS, driver_class, load_driver, split_driver_spec
 from lobstr_hw.drivers.driver import TrackerDriver
-from lobstr_hw.drivers.replay import ReplayDriver
 from lobstr_hw.errors import TrackerNotFound
 from lobstr_hw.runtime.many_drivers import ManyDrivers
 

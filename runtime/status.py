@@ -54,8 +54,8 @@ class Snapshot:
 def render(now: Snapshot, before: Snapshot | None = None) -> RenderableType:
     """One row: the rate since the snapshot before, trackers, contacts, trouble, progress."""
     grid = Table.grid(padding=(0, 2))
-    cells = [_progress(now), _rate(now, before), _calibration(now), _roles(now.pose)]
-    cells += [_contacts(now.pose), _trouble(now)]
+    cells: list[RenderableType] = [_progress(now), _rate(now, before), _calibration(now)]
+    cells += [_roles(now.pose), _contacts(now.pose), _trouble(now)]
     if now.total_s is not None:
         share = min(now.elapsed_s / max(now.total_s, 1e-9), 1.0)
         cells.insert(0, ProgressBar(total=1.0, completed=share, width=20))

@@ -1,6 +1,6 @@
-"""``--output SINK``: what the user writes, and the output that it means.
+r"""``--output SINK``: what the user writes, and the output that it means.
 
-NAME:REST                       bvh:C:\\takes\\out.bvh, ndjson:-
+NAME:REST                       bvh:C:\takes\out.bvh, ndjson:-
 NAME://host:port?key=value      for sinks on the network
 """
 

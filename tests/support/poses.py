@@ -14,7 +14,7 @@ def random_poses(seed: int, n: int, body: Body, rate_hz: float = 45.0) -> list[S
     poses = []
     for k in range(n):
         R_local = from_rotation_vector(rng.normal(scale=0.4, size=(1, 22, 3)))
-        p_hips = rng.normal(size=(1, 3)) + [0.0, 1.0, 0.0]
+        p_hips = rng.normal(size=(1, 3)) + np.array([0.0, 1.0, 0.0])
         p_world, _ = forward_kinematics(R_local, p_hips, body.offsets)
         contact = rng.random((1, 2)) < 0.5
         source = np.full((1, 22), Source.IK, dtype=np.int8)

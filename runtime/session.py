@@ -1,0 +1,119 @@
+"""One user's session: calibrated once, then a body every tick."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from lobstr_hw.avatar import Avatar
+from lobstr_hw.calibration.calibration import Calibration
+from lobstr_hw.predictors.predictor import Frame, Predictor, State
+from lobstr_hw.runtime.feed import Feed
+from lobstr_hw.runtime.standing import standing_pose
+from lobstr_hw.runtime.ticks import Tick
+from lobstr_hw.skeleton import Body
+from lobstr_hw.skeleton_pose import SkeletonPose
+from lobstr_hw.trackers import TrackerRole, TrackerSample
+
+__all__ = ["Session"]
+
+Watcher = Callable[[Sequence[TrackerSample]], Calibration | None]
+"""Shown the samples of every tick until it finds a calibration in them."""
+
+
+class Session:
+    """Calibration, avatar and its state.
+
+    Attributes:
+        body: the user's sizes; the standard body before the first calibration.
+        calibrated: whether the sizes are known.
+        nonfinite_frames: poses that were not finite and were replaced by the last good one.
+    """
+
+    def __init__(
+        self,
+        predictor: Predictor,
+        watch: Watcher,
+        calibration: Calibration | None = None,
+        *,
+        rate_hz: float,
+        input_delay_s: float,
+    ) -> None:
+        """Begin before the first tick.
+
+        Args:
+            predictor: moves the joints that no tracker sees.
+            watch: finds the calibration in the stream.
+            calibration: from a profile; nothing is watched for then.
+            rate_hz: of the ticks.
+            input_delay_s: of the predictor's grid behind the ticks.
+        """
+        self.predictor = predictor
+        self._rate_hz, self._input_delay_s = rate_hz, input_delay_s
+        self.body = Body.standard()
+        self.nonfinite_frames = 0
+        self._watch = watch
+        self._calibration: Calibration | None = None
+        self._good: SkeletonPose | None = None
+        if calibration is not None:
+            self._begin(calibration)
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether the user's sizes are known."""
+        return self._calibration is not None
+
+    @property
+    def roles(self) -> Mapping[str, TrackerRole]:
+        """Serial -> role, as calibrated; empty before."""
+        return {} if self._calibration is None else self._calibration.roles
+
+    def calibrate(self, samples: Sequence[TrackerSample]) -> bool:
+        """Look for a calibration in new samples; True when this call found the first."""
+        if self._calibration is not None:
+            return False
+        found = self._watch(samples)
+        if found is not None:
+            self._begin(found)
+        return found is not None
+
+    def _begin(self, calibration: Calibration) -> None:
+        self._calibration = calibration
+        self.body = calibration.body
+        self._avatar = Avatar(
+            self.predictor,
+            self.body,
+            loop_rate_hz=self._rate_hz,
+            input_delay_s=self._input_delay_s,
+        )
+        self._state = self._avatar.start()
+
+    def step(self, tick: Tick, feed: Feed) -> SkeletonPose:
+        """The body at a tick: standing still until the user is calibrated and seen."""
+        roles = feed.report(tick.time_s)
+        if self._calibration is None or not feed.seen(self.predictor.card.needs):
+            return standing_pose(tick.time_s, feed.head(tick.time_s), self.body, roles)
+        frame, *grid = self._frames(self._calibration, tick, feed)
+        state, pose = self._avatar.step(self._state, frame, grid)
+        return self._finite(state, replace(pose, roles=roles))
+
+    def _frames(self, calibration: Calibration, tick: Tick, feed: Feed) -> list[Frame]:
+        """Joint poses at the tick's time, then at the grid times due by it."""
+        times_s = (tick.time_s, *tick.grid_s)
+        seen = feed.at(times_s)
+        return [
+            calibration.frame(
+                time_s, feed.roles, seen.p[[i]], seen.R[[i]], seen.valid_p[[i]], seen.valid_R[[i]]
+            )
+            for i, time_s in enumerate(times_s)
+        ]
+
+    def _finite(self, state: State, pose: SkeletonPose) -> SkeletonPose:
+        """A pose that may go out; one that is not finite leaves no trace in the state either."""
+        if np.isfinite(pose.p_world).all() and np.isfinite(pose.R_local).all():
+            self._state, self._good = state, pose
+            return pose
+        self.nonfinite_frames += 1
+        if self._good is None:
+            return standing_pose(pose.time_s, None, self.body, pose.roles)
+        return replace(self._good, time_s=pose.time_s, roles=pose.roles)
