@@ -24,6 +24,8 @@ Progress = Callable[[int, int, str], None]
 """Called after each clip: clips done, clips in all, name of the clip."""
 
 _EVIDENCE_FRAMES = 20_000
+_ON_FEET_M = (0.15, 0.45)
+"""Height of the hip joints over the floor from which the feet carry none, and all, of the body."""
 _TOES = [leg[3] for leg in LEGS]
 
 
@@ -145,14 +147,21 @@ def retarget_clip(
         R = resample_rotations(R_local[a:b], at)
         centre = resample_points(source.hip_centre()[a:b], at)
         toes = resample_points(p_toes[a:b], at) - [0.0, shift, 0.0]
-        p_hips = _hips(centre, R[:, Joint.HIPS]) + [0.0, frames.lift - shift, 0.0]
+        p_hips = _hips(centre - [0.0, shift, 0.0], R[:, Joint.HIPS], frames.lift)
         name = f"{clip.name}#{k}" if cuts else clip.name
         R = solve_legs(R, p_hips, toes)
         out.append(Motion(name, clip.subject, RATE_HZ, p_hips, R, toes, source.metres))
     return out
 
 
-def _hips(centre: Array, R_hips: Array) -> Array:
-    """The hips joint stands over the middle of the hip joints, as far as on the standard skeleton."""
+def _hips(centre: Array, R_hips: Array, lift: float) -> Array:
+    """The hips joint stands over the middle of the hip joints, as far as on the standard skeleton.
+
+    ``lift`` makes up for the ankle's height; a body that lies or sits on the floor has none.
+    """
     over = -STANDARD_OFFSETS[Joint.LEFT_UPPER_LEG] * [0.0, 1.0, 1.0]
-    return np.asarray(centre + R_hips @ over)
+    low, high = _ON_FEET_M
+    on_feet = np.clip((centre[:, 1] - low) / (high - low), 0.0, 1.0)
+    p = centre + R_hips @ over
+    p[:, 1] += lift * on_feet
+    return np.asarray(p)
