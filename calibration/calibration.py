@@ -9,7 +9,7 @@ import numpy as np
 from lobstr_hw.poses import Pose, frozen
 from lobstr_hw.predictors.predictor import Bools, Frame
 from lobstr_hw.rotations import Array
-from lobstr_hw.skeleton import Body
+from lobstr_hw.skeleton import Body, Joint
 from lobstr_hw.trackers import TrackerRole
 
 __all__ = ["Calibration", "Residuals"]
@@ -78,6 +78,12 @@ class Calibration:
     def scale(self) -> float:
         """S = 1.0 / the user's hips height."""
         return float(self.body.scale[0])
+
+    @property
+    def arm_m(self) -> float:
+        """From shoulder joint to wrist."""
+        bones = self.body.offsets[0, [Joint.LEFT_LOWER_ARM, Joint.LEFT_HAND]]
+        return float(np.sum(np.linalg.norm(bones, axis=-1)))
 
     def serial_of(self, role: TrackerRole) -> str | None:
         """The tracker that stands for a role."""

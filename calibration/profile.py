@@ -121,13 +121,14 @@ def profile_from_json(text: str, name: str = "profile") -> Calibration:
     reader = _Reader(name, document)
     version = reader.value("format")
     if version != FORMAT:
-        raise ProfileError(
-            f"{name}: format is {version}, this program reads {FORMAT}. {_remedy(name)}"
-        )
+        raise reader.fault("format", f"is {version!r}; this program reads {FORMAT}")
     trackers = reader.mapping("trackers")
     if not trackers:
         raise reader.fault("trackers", "has no tracker")
     keys = [("trackers", serial) for serial in trackers]
+    roles = {key[-1]: reader.role(*key, "role") for key in keys}
+    if len(set(roles.values())) < len(roles):
+        raise reader.fault("trackers", "name one role twice")
     hips_height_m = reader.positive("hips_height_m")
     body = Body(
         np.array([[reader.numbers("body", "offsets_m", joint, n=3) for joint in HUMANOID_NAMES]]),
@@ -135,9 +136,7 @@ def profile_from_json(text: str, name: str = "profile") -> Calibration:
         np.array([1.0 / hips_height_m]),
     )
     return Calibration(
-        roles={
-            serial: reader.role(*key, "role") for serial, key in zip(trackers, keys, strict=True)
-        },
+        roles=roles,
         R_tracker_joint=np.stack(
             [reader.rotation(*key, "joint_in_tracker_quat_xyzw") for key in keys]
         ),

@@ -142,9 +142,10 @@ class TPoseDetector:
 
     def failure(self) -> CalibrationError:
         """Why none was found: MissingRole, or TPoseNotFound with how close it came."""
-        seen = self._window.serials
-        if self.best is None and len(seen) < len(FOUR_POINTS):
-            return missing_role({serial: self.hints.get(serial) for serial in seen})
+        seen = {serial: self.hints.get(serial) for serial in self._window.serials}
+        unclaimed = [role for role in FOUR_POINTS if role not in seen.values()]
+        if len(unclaimed) > list(seen.values()).count(None):
+            return missing_role(seen)
         wanted = f"Stand in a T-pose for {self._window.length_s + 0.5:.0f} seconds and try again."
         if self.best is None:
             return TPoseNotFound(

@@ -19,7 +19,7 @@ class TrackingErrors:
         jitter_m, jitter_rad: white, per sample; sub-millimetre with two stations in sight.
         drift_m, drift_rad: slow wander, deviation of an Ornstein-Uhlenbeck process.
         drift_memory_s: over which the drift forgets.
-        jumps_per_minute: of each tracker; reflections: the pose stands off for up to 0.2 s, said to be tracked.
+        jumps_per_minute: reflections, of each tracker: up to 0.2 s off, said to be tracked.
         jump_m: mean size of a jump.
         dropouts_per_minute: of each tracker; 0.1 to 1 s without sight, tracked False.
         coast_s: for so long a blind tracker goes on at its speed (fading), then it holds.
