@@ -41,7 +41,7 @@ def pose_upper_body(
         The spine's (n, 4, 3, 3) and the arms' (n, 2, 3, 3, 3), ordered as :data:`SPINE_JOINTS` and
         :data:`ARM_JOINTS`.
     """
-    spine = solve_spine(p_hips, R_hips, p_head, R_head, offsets)
+    spine = solve_spine(p_hips, R_hips, p_head, R_head, p_hand, offsets)
     chain = np.concatenate([R_hips[:, None], spine[:, :2]], axis=1)
     steps = rotate(chain, offsets[:, Joint.SPINE : Joint.UPPER_CHEST + 1])
     p_chest = p_hips + steps.sum(axis=1)

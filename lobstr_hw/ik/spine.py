@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lobstr_hw.ik.two_bone import stretch_towards
 from lobstr_hw.ik.vectors import (
     dot,
     faded_angle,
@@ -35,18 +36,32 @@ __all__ = ["SpineSettings", "solve_spine"]
 
 @dataclass(frozen=True, slots=True)
 class SpineSettings:
-    """How the spine shares what lies between hips and head.
+    """How the spine shares what lies between hips and head; angles in radians.
+
+    The upper chest turns with the hands more than with the head: fitted on recorded people
+    (docs/ik.md).
 
     Attributes:
-        twist: share of the head's twist against the hips that spine, chest and upper chest have
-            taken up; the rest is the neck's and the head's.
+        line: of chest per metre that the right hand is further forward than the left.
+        middle: of chest per metre that the hands, added up, are to the left of the head.
+        hands_limit: of chest that the hands alone can bring about.
+        head: of chest per radian of the head's twist against the hips, looking a little aside.
+        look_behind: the same for what the head's twist exceeds ``head_free``, softly.
+        head_free: twist up to which the neck does nearly all.
+        shares: of the upper chest's twist that spine, chest and upper chest have taken up.
         neck: share of the remaining turn towards the head that the neck takes.
         hunch: how much a spine that is too long for its chord prefers to bend backwards (as
             slouching people do) over following the pelvis' own tilt.
     """
 
-    twist: tuple[float, float, float] = (0.10, 0.22, 0.35)
-    neck: float = 0.5
+    line: float = 0.45
+    middle: float = 0.2
+    hands_limit: float = 0.7
+    head: float = 0.12
+    look_behind: float = 0.35
+    head_free: float = 0.9
+    shares: tuple[float, float, float] = (0.4, 0.75, 1.0)
+    neck: float = 0.4
     hunch: float = 0.35
 
 
@@ -55,6 +70,7 @@ def solve_spine(
     R_hips: Array,
     p_head: Array,
     R_head: Array,
+    p_hand: Array,
     offsets: Array,
     settings: SpineSettings | None = None,
 ) -> Array:
@@ -65,6 +81,7 @@ def solve_spine(
         R_hips: (n, 3, 3).
         p_head: (n, 3).
         R_head: (n, 3, 3).
+        p_hand: left and right wrist (n, 2, 3).
         offsets: (n, 22, 3) of the body.
         settings: shares; the defaults if None.
 
@@ -74,26 +91,37 @@ def solve_spine(
     settings = settings or SpineSettings()
     bones = offsets[:, Joint.CHEST : Joint.NECK + 1]  # of spine, chest, upper chest (n, 3, 3)
     p_spine = p_hips + rotate(R_hips, offsets[:, Joint.SPINE])
-    torso, angle = _torso(p_head - p_spine, R_hips, R_head)
+    torso = swing(R_hips[..., :, 1], unit(p_head - p_spine)) @ R_hips  # its Y along the trunk
+    angle = _chest_twist(np.swapaxes(torso, -1, -2), R_head, p_hand - p_head[:, None], settings)
     R_neck = _neck(torso, angle, R_head, settings)
-    chord = p_head - rotate(R_neck, offsets[:, Joint.HEAD]) - p_spine
+    neck = rotate(R_neck, offsets[:, Joint.HEAD])
+    R_stretch = stretch_towards(neck, p_head - p_spine, length(bones).sum(axis=1), np.pi)
+    R_neck = R_stretch @ R_neck
+    chord = p_head - p_spine - rotate(R_stretch, neck)
 
     axis = unit(np.where(length(chord) > 1e-9, chord, torso[..., :, 1]))
     upright = swing(R_hips[..., :, 1], axis) @ R_hips  # the hips' frame, its Y along the chord
     directions = _arc(axis, length(chord), length(bones), _bulge(axis, R_hips, upright, settings))
-    twisted = upright[:, None] @ turn(_about_y(angle[:, None] * np.array(settings.twist)))
+    twisted = upright[:, None] @ turn(_about_y(angle[:, None] * np.array(settings.shares)))
     R = swing(unit(rotate(twisted, bones)), directions) @ twisted
     return np.concatenate([R, R_neck[:, None]], axis=1)
 
 
-def _torso(line: Array, R_hips: Array, R_head: Array) -> tuple[Array, Array]:
-    """The hips' frame with its Y along the line to the head, and the head's twist against it."""
-    torso = swing(R_hips[..., :, 1], unit(line)) @ R_hips
-    return torso, faded_angle(*twist_terms(np.swapaxes(torso, -1, -2) @ R_head, axis=1))
+def _chest_twist(
+    to_torso: Array, R_head: Array, from_head: Array, settings: SpineSettings
+) -> Array:
+    """Of the upper chest against the hips (n,), from the head's twist and the hands' places."""
+    hand = rotate(to_torso[:, None], from_head)  # (n, 2, 3)
+    ahead = settings.line * (hand[:, 1, 2] - hand[:, 0, 2])
+    aside = settings.middle * (hand[:, 0, 0] + hand[:, 1, 0])
+    by_hands = settings.hands_limit * np.tanh((ahead + aside) / settings.hands_limit)
+    head = faded_angle(*twist_terms(to_torso @ R_head, axis=1))
+    excess = head - settings.head_free * np.tanh(head / settings.head_free)
+    return np.asarray(by_hands + settings.head * head + settings.look_behind * excess)
 
 
 def _neck(torso: Array, angle: Array, R_head: Array, settings: SpineSettings) -> Array:
-    below = torso @ turn(_about_y(angle * settings.twist[-1]))
+    below = torso @ turn(_about_y(angle))
     return np.asarray(below @ turn(settings.neck * sine_axis(np.swapaxes(below, -1, -2) @ R_head)))
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from lobstr_hw.ik.vectors import align, cross, dot, length, perpendicular, swing, turn, unit
 from lobstr_hw.rotations import Array
 
-__all__ = ["bend_and_swing", "limb_rotations", "solve_two_bone"]
+__all__ = ["bend_and_swing", "limb_rotations", "solve_two_bone", "stretch_towards"]
 
 
 def solve_two_bone(
@@ -108,3 +108,28 @@ def bend_and_swing(
     posed = upper + (R_bend @ lower[..., None])[..., 0]
     R_swing = swing(unit(posed), unit(to_end))
     return R_bend, R_swing, (R_swing @ posed[..., None])[..., 0]
+
+
+def stretch_towards(bone: Array, line: Array, reach: Array, most: float) -> Array:
+    """The turn of a posed first bone that brings an end just out of reach of the rest into it.
+
+    With the angle b between bone and line, the rest spans to the end where
+    |line|^2 + |bone|^2 - 2 |line| |bone| cos b is at most the square of its reach. No turn is
+    made for an end that is in reach already.
+
+    Args:
+        bone: as posed, in the world (..., 3).
+        line: from its root to the wanted end (..., 3).
+        reach: length of the rest, stretched (..., 1).
+        most: radians that the bone may turn.
+
+    Returns:
+        R (..., 3, 3), to apply to the bone.
+    """
+    axis = cross(bone, line)
+    sine = length(axis)
+    cosine = 0.5 * (dot(line, line) + dot(bone, bone) - reach**2)
+    cosine = cosine / np.maximum(length(bone) * length(line), 1e-9)
+    wanted = np.arccos(np.clip(cosine, -1.0, 1.0))
+    angle = np.clip(np.arctan2(sine, dot(bone, line)) - wanted, 0.0, most)
+    return turn(axis / np.maximum(sine, 1e-9) * angle)
