@@ -1,6 +1,6 @@
 """Draw, per set, a source rig and the retargeted skeleton side by side: docs/pictures/SET.png.
 
-    python tools/render_sets.py OUT_FOLDER FOLDER...
+python tools/render_sets.py OUT_FOLDER FOLDER...
 """
 
 import argparse
@@ -129,9 +129,7 @@ def _skeleton(p: Array, R: Array) -> tuple[Array, list[tuple[int, int, str]]]:
     return np.concatenate([p, extra]), lines
 
 
-def _stick(
-    ax: Axes, q: Array, lines: list[tuple[int, int, str]], column: int, at: Array
-) -> None:
+def _stick(ax: Axes, q: Array, lines: list[tuple[int, int, str]], column: int, at: Array) -> None:
     """Seen from the right (Z to the right) or from the front (the left hand on the right)."""
     across = 0 if column else 2
     for a, b, colour in lines:

@@ -1,6 +1,6 @@
 """Do the sets agree after retargeting? The same gait must give the same angles (docs/retargeting.md).
 
-    python -m lobstr_hw.retargeting.agreement FOLDER...
+python -m lobstr_hw.retargeting.agreement FOLDER...
 """
 
 import argparse

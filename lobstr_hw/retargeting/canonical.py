@@ -10,9 +10,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lobstr_hw.retargeting.evidence import LEAST_WALK_S, RATE_HZ, Bools, Evidence, gather
+from lobstr_hw.retargeting.evidence import (
+    LEAST_WALK_S,
+    RATE_HZ,
+    Bools,
+    Evidence,
+    gather,
+    trunk_line,
+)
 from lobstr_hw.retargeting.source import LEGS, SourceClip
-from lobstr_hw.rotations import Array, heading, normalize, rotation_mean, transpose
+from lobstr_hw.rotations import (
+    Array,
+    heading,
+    normalize,
+    rotation_between,
+    rotation_mean,
+    slerp,
+    transpose,
+)
 from lobstr_hw.skeleton import PARENTS, STANDARD_OFFSETS, Joint
 
 __all__ = ["CanonicalFrames", "canonical_rotations", "fit_frames"]
@@ -104,7 +119,9 @@ class _Fit:
         line = self.e.p[:, Joint.LEFT_UPPER_LEG] - self.e.p[:, Joint.RIGHT_UPPER_LEG]
         x = _direction(self._inside(Joint.HIPS, line))
         if self.e.upright.any():
-            up = _direction(self._inside(Joint.HIPS, np.broadcast_to(_UP, line.shape))[self.e.upright])
+            up = _direction(
+                self._inside(Joint.HIPS, np.broadcast_to(_UP, line.shape))[self.e.upright]
+            )
         else:
             up = self.rest[Joint.UPPER_CHEST] - self.rest[Joint.HIPS]
         self.A[Joint.HIPS] = _frame(x=x, y=up)
@@ -113,9 +130,14 @@ class _Fit:
         if self.e.walking_s < LEAST_WALK_S and self._instead(*_TRUNK):
             return
         ahead = heading(self._canonical(Joint.HIPS))
+        # a player walks with the back bent forward and the eyes level: the line from hips to
+        # shoulders says how far the chest leans, and is upright on the standard skeleton
+        leaning = rotation_between(_UP, trunk_line(self.e.p)) @ ahead
+        target = dict.fromkeys(_TRUNK, leaning)
+        target |= {Joint.HEAD: ahead, Joint.NECK: slerp(leaning, ahead, 0.5)}
         for joint in _TRUNK:
             if joint in self.mapped:
-                self._follow(joint, ahead, self.e.upright, Joint.HIPS)
+                self._follow(joint, target[joint], self.e.upright, Joint.HIPS)
 
     def _follow(self, joint: Joint, target: Array, when: Array, like: Joint) -> None:
         """The frame that is on average the target's while ``when``; else the rest pose of ``like``."""
@@ -161,7 +183,9 @@ class _Fit:
 
     def _along(self, joint: Joint, y: Array, x: Array) -> Array:
         """Y along the bone, X the hinge's axis, both as the joint's own frame has them."""
-        return _frame(y=_direction(self._inside(joint, y)), x=_direction(self._inside(joint, x)), first="y")
+        return _frame(
+            y=_direction(self._inside(joint, y)), x=_direction(self._inside(joint, x)), first="y"
+        )
 
     def _arm(self, side: int) -> None:
         shoulder, upper, lower, hand = _ARMS[side]

@@ -41,9 +41,7 @@ class ClipFile:
         return f"{self.set_name}/{self.clip}"
 
 
-def find_clips(
-    paths: Iterable[str | Path], metres_per_unit: float | None = None
-) -> list[ClipFile]:
+def find_clips(paths: Iterable[str | Path], metres_per_unit: float | None = None) -> list[ClipFile]:
     """The BVH files among files and folders (searched with all below), sorted.
 
     A ``manifest.csv`` beside the clips, or up to two folders above, adds subject, unit and category.

@@ -34,9 +34,7 @@ def find_jumps(R_local: Array, rate_hz: float) -> npt.NDArray[np.bool_]:
     return bad
 
 
-def good_pieces(
-    R_local: Array, rate_hz: float, faults: Sequence[Fault]
-) -> list[tuple[int, int]]:
+def good_pieces(R_local: Array, rate_hz: float, faults: Sequence[Fault]) -> list[tuple[int, int]]:
     """The stretches [first, last) of at least a second that no ``cut`` fault touches."""
     bad = np.zeros(len(R_local), dtype=bool)
     for fault in faults:

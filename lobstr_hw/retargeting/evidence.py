@@ -8,10 +8,10 @@ import numpy.typing as npt
 
 from lobstr_hw.retargeting.source import LEGS, SourceClip
 from lobstr_hw.retargeting.speed import speed
-from lobstr_hw.rotations import Array, normalize
+from lobstr_hw.rotations import Array, angle_between, normalize
 from lobstr_hw.skeleton import Joint
 
-__all__ = ["Bools", "Evidence", "LEAST_WALK_S", "RATE_HZ", "flat_stance", "gather"]
+__all__ = ["Bools", "Evidence", "LEAST_WALK_S", "RATE_HZ", "flat_stance", "gather", "trunk_line"]
 
 Bools = npt.NDArray[np.bool_]
 
@@ -19,6 +19,7 @@ RATE_HZ = 15.0  # poses further apart than this say nothing new
 _WALK_M_S = (0.4, 2.2)
 LEAST_WALK_S = 1.0  # a whole stride
 _LEAST_UPRIGHT_S = 0.5
+_LEAN = np.radians(15.0)
 _STILL_M_S = 0.15
 _FLAT_M = 0.020
 _STANDING_M = 0.65
@@ -50,11 +51,14 @@ def gather(clips: Sequence[SourceClip]) -> Evidence:
     parts = [_part(clip) for clip in clips]
     p, R, flat, forward, height = (np.concatenate(column) for column in zip(*parts, strict=True))
     tall = height > 0.94 * np.percentile(height, 95.0)
-    walking, notes = tall & forward, []
+    lean = angle_between(trunk_line(p), np.array([0.0, 1.0, 0.0]))
+    walking, notes = tall & forward & (lean < _LEAN), []
+    if walking.sum() < LEAST_WALK_S * RATE_HZ:
+        walking = tall & forward
     walking_s = float(walking.sum() / RATE_HZ)
     if walking_s < LEAST_WALK_S:
         notes.append(f"{walking_s:.1f} s of walking upright")
-        walking = tall & _looks_upright(p)
+        walking = tall & (lean < 2.0 * _LEAN)
     if walking.sum() < _LEAST_UPRIGHT_S * RATE_HZ:
         notes.append("no upright pose")
         walking = np.zeros_like(walking)
@@ -75,10 +79,10 @@ def _part(clip: SourceClip) -> tuple[Array, Array, Bools, Bools, Array]:
     return clip.p[thin], clip.R[thin], flat[thin], forward[thin], (centre[:, 1] - lowest)[thin]
 
 
-def _looks_upright(p: Array) -> Bools:
-    """The trunk within 30 degrees of the vertical."""
-    trunk = normalize(p[:, Joint.HEAD] - p[:, Joint.HIPS])
-    return np.asarray(trunk[:, 1] > np.cos(np.radians(30.0)))
+def trunk_line(p: Array) -> Array:
+    """From the middle of the hip joints to the middle of the shoulder joints: (F, 3)."""
+    shoulders = p[:, Joint.LEFT_UPPER_ARM] + p[:, Joint.RIGHT_UPPER_ARM]
+    return np.asarray(0.5 * (shoulders - p[:, Joint.LEFT_UPPER_LEG] - p[:, Joint.RIGHT_UPPER_LEG]))
 
 
 def flat_stance(clip: SourceClip) -> Bools:

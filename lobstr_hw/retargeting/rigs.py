@@ -40,7 +40,10 @@ class Rig:
         index = {_plain(n): i for i, n in reversed(list(enumerate(names)))}
         patterns = dict(zip(list(Joint)[:6], self.trunk, strict=True))
         for first, side in zip(
-            ((Joint.LEFT_SHOULDER, Joint.LEFT_UPPER_LEG), (Joint.RIGHT_SHOULDER, Joint.RIGHT_UPPER_LEG)),
+            (
+                (Joint.LEFT_SHOULDER, Joint.LEFT_UPPER_LEG),
+                (Joint.RIGHT_SHOULDER, Joint.RIGHT_UPPER_LEG),
+            ),
             self.sides,
             strict=True,
         ):
@@ -62,13 +65,31 @@ def _plain(name: str) -> str:
     return name.rsplit(":", 1)[-1].lower()
 
 
-_ARM_LEG = ("*Shoulder", "*Arm", "*ForeArm", "*Hand", "*UpLeg", "*Leg", "*Foot", "*ToeBase|*Toe|*Toes")
+_ARM_LEG = (
+    "*Shoulder",
+    "*Arm",
+    "*ForeArm",
+    "*Hand",
+    "*UpLeg",
+    "*Leg",
+    "*Foot",
+    "*ToeBase|*Toe|*Toes",
+)
 
 RIGS = (
     Rig(
         "standard skeleton (HumanBodyBones)",
         ("Hips", "Spine", "Chest", "UpperChest|Chest", "Neck", "Head"),
-        ("*Shoulder", "*UpperArm", "*LowerArm", "*Hand", "*UpperLeg", "*LowerLeg", "*Foot", "*Toes"),
+        (
+            "*Shoulder",
+            "*UpperArm",
+            "*LowerArm",
+            "*Hand",
+            "*UpperLeg",
+            "*LowerLeg",
+            "*Foot",
+            "*Toes",
+        ),
     ),
     Rig(
         "CMU (cgspeed BVH)",

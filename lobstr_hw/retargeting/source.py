@@ -18,7 +18,9 @@ LEGS = (
     (Joint.LEFT_UPPER_LEG, Joint.LEFT_LOWER_LEG, Joint.LEFT_FOOT, Joint.LEFT_TOES),
     (Joint.RIGHT_UPPER_LEG, Joint.RIGHT_LOWER_LEG, Joint.RIGHT_FOOT, Joint.RIGHT_TOES),
 )
-LEG_LENGTH = -float(STANDARD_OFFSETS[Joint.LEFT_LOWER_LEG, 1] + STANDARD_OFFSETS[Joint.LEFT_FOOT, 1])
+LEG_LENGTH = -float(
+    STANDARD_OFFSETS[Joint.LEFT_LOWER_LEG, 1] + STANDARD_OFFSETS[Joint.LEFT_FOOT, 1]
+)
 _SAME_SHAPE = 0.02
 _UNITS_M = (1.0, 0.01, 0.0254, 0.0254 / 0.45, 0.001)
 
@@ -81,7 +83,9 @@ def load_source(clip: ClipFile) -> SourceClip:
     leg = _leg_length(p)
     standard = is_standard(bvh.names)
     if not standard:
-        level = floor_tilt(p[:, [leg_[3] for leg_ in LEGS]] * LEG_LENGTH / leg, 1.0 / bvh.frame_time_s)
+        level = floor_tilt(
+            p[:, [leg_[3] for leg_ in LEGS]] * LEG_LENGTH / leg, 1.0 / bvh.frame_time_s
+        )
         p, R = p @ level.T, level @ R
     unit = clip.metres_per_unit or min(_UNITS_M, key=lambda u: abs(np.log(u * leg / 0.82)))
     scale = LEG_LENGTH / leg
