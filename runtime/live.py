@@ -15,6 +15,7 @@ from lobstr_hw.runtime.calibrating import TPoseWatcher
 from lobstr_hw.runtime.clock import Clock, HostClock
 from lobstr_hw.runtime.feed import Feed
 from lobstr_hw.runtime.loop import run
+from lobstr_hw.runtime.outputs.output import Output
 from lobstr_hw.runtime.outputs.queued import QueuedOutput
 from lobstr_hw.runtime.outputs.sinks import SinkSpec, make_output
 from lobstr_hw.runtime.roles import RoleTable
@@ -64,6 +65,12 @@ class LiveSession:
     """Everything that one run needs, made in the order in which it can fail.
 
     ``with LiveSession(...) as live: live.run(stop)``; leaving it closes driver and outputs.
+
+    Attributes:
+        session: the user's calibration and avatar.
+        feed: the trackers by role.
+        outputs: open ones; a caller may add its own, which it closes itself.
+        ticks, tally: what the summary is made of.
     """
 
     def __init__(
@@ -81,7 +88,8 @@ class LiveSession:
         self.options = options
         self.tell = tell
         self.clock = clock or HostClock()
-        self.outputs: list[QueuedOutput] = []
+        self.outputs: list[Output] = []
+        self._queues: list[QueuedOutput] = []
         self._open = ExitStack()
         self._pose: SkeletonPose | None = None
 
@@ -152,6 +160,7 @@ class LiveSession:
             output.open(self.session.body, self.options.rate_hz, self.options.take)
             self._open.callback(output.close)
             self.outputs.append(output)
+            self._queues.append(output)
             if self.session.calibrated:
                 output.calibrated(self.session.body)
 
@@ -193,7 +202,7 @@ class LiveSession:
             wall_s=self.clock.now_s(),
             calibrated=self.session.calibrated,
             overruns=self.ticks.overruns,
-            backlog=sum(output.backlog for output in self.outputs),
+            backlog=sum(queue.backlog for queue in self._queues),
             gate_events=self.feed.gate.events.total(),
             pose=pose,
         )

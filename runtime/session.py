@@ -26,7 +26,7 @@ class Session:
 
     Attributes:
         body: the user's sizes; the standard body before the first calibration.
-        calibrated: whether the sizes are known.
+        calibration: None before the first.
         nonfinite_frames: poses that were not finite and were replaced by the last good one.
     """
 
@@ -53,7 +53,7 @@ class Session:
         self.body = Body.standard()
         self.nonfinite_frames = 0
         self._watch = watch
-        self._calibration: Calibration | None = None
+        self.calibration: Calibration | None = None
         self._good: SkeletonPose | None = None
         if calibration is not None:
             self._begin(calibration)
@@ -61,16 +61,16 @@ class Session:
     @property
     def calibrated(self) -> bool:
         """Whether the user's sizes are known."""
-        return self._calibration is not None
+        return self.calibration is not None
 
     @property
     def roles(self) -> Mapping[str, TrackerRole]:
         """Serial -> role, as calibrated; empty before."""
-        return {} if self._calibration is None else self._calibration.roles
+        return {} if self.calibration is None else self.calibration.roles
 
     def calibrate(self, samples: Sequence[TrackerSample]) -> bool:
         """Look for a calibration in new samples; True when this call found the first."""
-        if self._calibration is not None:
+        if self.calibration is not None:
             return False
         found = self._watch(samples)
         if found is not None:
@@ -78,7 +78,7 @@ class Session:
         return found is not None
 
     def _begin(self, calibration: Calibration) -> None:
-        self._calibration = calibration
+        self.calibration = calibration
         self.body = calibration.body
         self._avatar = Avatar(
             self.predictor,
@@ -91,9 +91,9 @@ class Session:
     def step(self, tick: Tick, feed: Feed) -> SkeletonPose:
         """The body at a tick: standing still until the user is calibrated and seen."""
         roles = feed.report(tick.time_s)
-        if self._calibration is None or not feed.seen(self.predictor.card.needs):
+        if self.calibration is None or not feed.seen(self.predictor.card.needs):
             return standing_pose(tick.time_s, feed.head(tick.time_s), self.body, roles)
-        frame, *grid = self._frames(self._calibration, tick, feed)
+        frame, *grid = self._frames(self.calibration, tick, feed)
         state, pose = self._avatar.step(self._state, frame, grid)
         return self._finite(state, replace(pose, roles=roles))
 

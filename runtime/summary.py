@@ -150,8 +150,8 @@ def percentiles(values_ms: "array[float]") -> dict[str, float | None]:
     """p50, p99 and max of durations; None without any."""
     if not values_ms:
         return {"p50": None, "p99": None, "max": None}
-    p50, p99, most = np.percentile(np.array(values_ms), (50, 99, 100))
-    return {"p50": round(p50, 4), "p99": round(p99, 4), "max": round(most, 4)}
+    found = np.percentile(np.array(values_ms), (50, 99, 100)).round(4).tolist()
+    return dict(zip(("p50", "p99", "max"), found, strict=True))
 
 
 def write_summary(path: Path, summary: Summary) -> None:
