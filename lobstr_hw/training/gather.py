@@ -12,8 +12,8 @@ from lobstr_hw.features import FEATURE_VERSION
 from lobstr_hw.motion import Motion
 from lobstr_hw.retargeting import ClipFile, find_clips, retarget
 from lobstr_hw.skeleton import SKELETON_VERSION
+from lobstr_hw.splits import Split, clip_name
 from lobstr_hw.training.dataset import RATE_HZ, Clips, load_clips, save_clips
-from lobstr_hw.training.splits import Split, clip_name
 
 __all__ = ["describe", "gather", "part_of_clips"]
 
@@ -34,9 +34,9 @@ def gather(
     """
     wanted = split.parts["train"] | split.parts["validation"]
     found = find_clips(paths)
-    people = {(clip.set_name, clip.subject) for clip in found if clip.name in wanted}
-    # canonical frames are fitted per person: give the fit all of a person's clips
-    files = [clip for clip in found if (clip.set_name, clip.subject) in people]
+    sets = {clip.set_name for clip in found if clip.name in wanted}
+    # canonical frames are fitted from the clips given: more than the wanted ones makes them better
+    files = [clip for clip in found if clip.set_name in sets]
     if not files:
         raise FileFormatError(
             f"none of the clips of the split {split.name!r} is in {', '.join(map(str, paths))}. "

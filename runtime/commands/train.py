@@ -88,8 +88,8 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _train(options: argparse.Namespace) -> int:
+    from lobstr_hw.splits import default_split, read_split
     from lobstr_hw.training.gather import describe, gather, part_of_clips
-    from lobstr_hw.training.splits import default_split, read_split
 
     split = read_split(options.split) if options.split else default_split()
     out: Path = options.out
