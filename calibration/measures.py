@@ -37,7 +37,7 @@ from lobstr_hw.skeleton import STANDARD_OFFSETS, STATURE, Body, Joint
 __all__ = ["Measures", "fit_measures"]
 
 _FREE_M = 100.0  # no opinion
-_GIVEN_M = 0.005  # a stature that somebody typed in
+_GIVEN_M = 0.0005  # what somebody typed in overrules the headset
 _MEASURED_M = np.array([0.006, 0.012, 0.012, 0.012])
 """Of a tracker's position in the pose: tracking, sway, and the lever of a segment that is off."""
 _SHOULDER_OF_TRUNK = (
