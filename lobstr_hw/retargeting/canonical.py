@@ -142,8 +142,7 @@ class _Fit:
     def _follow(self, joint: Joint, target: Array, when: Array, like: Joint) -> None:
         """The frame that is on average the target's while ``when``; else the rest pose of ``like``."""
         if when.any():
-            mean = rotation_mean(transpose(self.e.R[when, joint]) @ target[when])
-            self.A[joint] = mean
+            self.A[joint] = _robust_mean(transpose(self.e.R[when, joint]) @ target[when])
         else:
             self.A[joint] = self.A[like]
 
@@ -216,6 +215,15 @@ class _Fit:
         if len(both) < _LEAST_FLAT:
             return self.others.lift if self.others else 0.0
         return _ANKLE_DROP - float(np.median(both))
+
+
+def _robust_mean(R: Array) -> Array:
+    """The mean (3, 3) of rotations (F, 3, 3) of which a few may be flipped."""
+    mean = rotation_mean(R)
+    for limit in (90.0, 45.0):
+        near = geodesic_angle(R, mean) < np.radians(limit)
+        mean = rotation_mean(R[near]) if near.any() else mean
+    return mean
 
 
 def _direction(v: Array) -> Array:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from lobstr_hw.retargeting.source import LEGS
-from lobstr_hw.rotations import Array, normalize
+from lobstr_hw.rotations import Array, normalize, rotation_between
 from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint, forward_kinematics, local_rotations
 
 __all__ = ["solve_legs"]
@@ -50,15 +50,29 @@ def solve_legs(R_local: Array, p_hips: Array, p_toes: Array) -> Array:
 
 
 def _hinge(p: Array, R: Array, side: int) -> Array:
-    """The knee's axis: normal to thigh and shin where it is bent, between their frames' X before."""
+    """The knee's axis: normal to thigh and shin where it is bent, near their frames' X before.
+
+    Some clips twist a whole thigh or shin by half a turn (the foot turned back again), so a frame's
+    X counts only as far as the pelvis, carried along by the thigh's swing, agrees with it.
+    """
     upper, lower, foot, _ = LEGS[side]
-    normal = np.cross(p[:, lower] - p[:, upper], p[:, foot] - p[:, lower])
+    thigh = p[:, lower] - p[:, upper]
+    normal = np.cross(thigh, p[:, foot] - p[:, lower])
     sine = np.linalg.norm(normal, axis=-1, keepdims=True) / (_THIGH * _SHIN)
+    hips = R[:, Joint.HIPS]
+    # swung by R from straight down, the pelvis' X is R X; a leg turns out by up to 90 degrees
+    swung = (rotation_between(-hips[:, :, 1], thigh) @ hips)[:, :, 0]
+    frames = 0.2 * swung
+    for joint in (upper, lower):
+        x = R[:, joint, :, 0]
+        trust = np.clip(0.5 + 2.0 * np.sum(x * swung, axis=-1, keepdims=True), 0.0, 1.0)
+        frames = frames + trust * x
+    frames = normalize(frames)
+    # a knee that bends backward is an overstretched one: only there the frames know the front
+    back = (np.sum(normal * frames, axis=-1, keepdims=True) < 0.0) & (sine < _BENT)
+    normal = np.where(back, -normal, normal)
     # a normal is a good axis from 35 degrees on and noise under 10
     w = np.clip((sine - _STRAIGHT) / (_BENT - _STRAIGHT), 0.0, 1.0)
-    frames = normalize(R[:, upper, :, 0] + R[:, lower, :, 0])
-    # hyperextended or flipped knees: the frames know which side is the front
-    normal *= np.where(np.sum(normal * frames, axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
     return normalize((1.0 - w) * frames + w * normalize(normal))
 
 
