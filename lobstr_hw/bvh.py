@@ -43,7 +43,7 @@ class Bvh:
         return len(self.R_local)
 
     def world(self) -> tuple[Array, Array]:
-        """Positions (F, J, 3), in the file's unit, and rotations (F, J, 3, 3) in the world by FK."""
+        """Positions (F, J, 3) in the file's unit and rotations (F, J, 3, 3), in the world by FK."""
         p, R = np.array(self.p_local), np.array(self.R_local)
         for j, parent in enumerate(self.parents):
             if parent >= 0:
@@ -84,7 +84,8 @@ def read_bvh(path: str | Path) -> Bvh:
     head, found, motion = _read_text(path).partition("MOTION")
     if not found:
         raise MotionFileError(
-            f"{path}: no MOTION section in {head.count(chr(10)) + 1} lines. Is this a whole BVH file?"
+            f"{path}: line {head.count(chr(10)) + 1}: the file ends without a MOTION section. "
+            "Is this a whole BVH file?"
         )
     layout = _parse_hierarchy(head, path)
     first_line = head.count("\n") + 1

@@ -1,4 +1,4 @@
-"""Do the sets agree after retargeting? The same gait must give the same angles (docs/retargeting.md).
+"""Do the sets agree after retargeting? One gait must give the same angles (docs/retargeting.md).
 
 python -m lobstr_hw.retargeting.agreement FOLDER...
 """
@@ -14,8 +14,8 @@ import numpy.typing as npt
 from lobstr_hw.errors import LobstrError
 from lobstr_hw.motion import Motion
 from lobstr_hw.retargeting.clips import find_clips
-from lobstr_hw.retargeting.speed import speed
 from lobstr_hw.retargeting.retarget import retarget
+from lobstr_hw.retargeting.speed import speed
 from lobstr_hw.rotations import Array, heading, transpose
 from lobstr_hw.skeleton import Joint
 
@@ -63,7 +63,7 @@ class Gait:
 
 
 def walking_frames(motion: Motion) -> npt.NDArray[np.bool_]:
-    """Frames (F,) of walking straight ahead, 0.5 to 2 times the standard height a second, upright."""
+    """Frames (F,) of walking straight ahead and upright, at 0.5 to 2 m/s of the standard size."""
     v = speed(motion.p_hips, motion.rate_hz, 0.5)
     ahead = heading(motion.R_local[:, Joint.HIPS])[:, :, 2]
     along = np.sum(v * ahead, axis=-1)
@@ -115,6 +115,7 @@ class Agreement:
     """Collects motions by set."""
 
     def __init__(self) -> None:
+        """Nothing seen yet."""
         self._frames: dict[str, list[dict[str, Array]]] = {}
 
     def add(self, motion: Motion) -> None:

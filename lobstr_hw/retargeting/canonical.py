@@ -21,6 +21,7 @@ from lobstr_hw.retargeting.evidence import (
 from lobstr_hw.retargeting.source import LEGS, SourceClip
 from lobstr_hw.rotations import (
     Array,
+    geodesic_angle,
     heading,
     normalize,
     rotation_between,
@@ -139,8 +140,8 @@ class _Fit:
             if joint in self.mapped:
                 self._follow(joint, target[joint], self.e.upright, Joint.HIPS)
 
-    def _follow(self, joint: Joint, target: Array, when: Array, like: Joint) -> None:
-        """The frame that is on average the target's while ``when``; else the rest pose of ``like``."""
+    def _follow(self, joint: Joint, target: Array, when: Bools, like: Joint) -> None:
+        """On average the target's frame while ``when``; else the zero pose of ``like``."""
         if when.any():
             self.A[joint] = _robust_mean(transpose(self.e.R[when, joint]) @ target[when])
         else:

@@ -1,4 +1,4 @@
-"""Motion clips on disk: which there are, whose they are, and what is known to be wrong with them."""
+"""Motion clips on disk: which there are, whose they are, and what is wrong with them."""
 
 import csv
 import re
@@ -44,7 +44,7 @@ class ClipFile:
 def find_clips(paths: Iterable[str | Path], metres_per_unit: float | None = None) -> list[ClipFile]:
     """The BVH files among files and folders (searched with all below), sorted.
 
-    A ``manifest.csv`` beside the clips, or up to two folders above, adds subject, unit and category.
+    A ``manifest.csv`` beside the clips, or up to two folders above, adds subject, unit, category.
 
     Args:
         paths: files and folders.
@@ -92,7 +92,7 @@ def _clip(
 
 
 def _with_player(subject: str, clip: str) -> str:
-    """A session of several people: the last number of ``s_SESSION_TAKE_PLAYER`` tells them apart."""
+    """In a session of several the last number of ``s_SESSION_TAKE_PLAYER`` is the player."""
     player = re.fullmatch(r"s_\d+_\d+_(\d+)", clip)
     if player and "session" in subject and not re.search("player|performer", subject):
         return f"{subject} player {player[1]}"

@@ -11,7 +11,7 @@ from lobstr_hw.retargeting.speed import speed
 from lobstr_hw.rotations import Array, angle_between, normalize
 from lobstr_hw.skeleton import Joint
 
-__all__ = ["Bools", "Evidence", "LEAST_WALK_S", "RATE_HZ", "flat_stance", "gather", "trunk_line"]
+__all__ = ["LEAST_WALK_S", "RATE_HZ", "Bools", "Evidence", "flat_stance", "gather", "trunk_line"]
 
 Bools = npt.NDArray[np.bool_]
 

@@ -1,4 +1,4 @@
-"""Clips of any rig onto the standard skeleton, at 45 Hz, on a floor at y = 0 (docs/retargeting.md)."""
+"""Clips of any rig onto the standard skeleton, 45 Hz, floor at y = 0 (docs/retargeting.md)."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""A clip as its rig has it, brought to the 22 joints and to the standard size, frames not fitted."""
+"""A clip as its rig has it: the 22 joints picked, standard size, frames not fitted yet."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -121,7 +121,7 @@ def _leg_length(p: Array) -> float:
 
 
 def same_rig(clips: Sequence[ClipFile]) -> list[list[ClipFile]]:
-    """Clips of one set in lists of one rig each: the same joints, bones alike but for their unit."""
+    """Clips of one set in lists of one rig each: the same joints, bones alike but for the unit."""
     rigs: list[tuple[str, tuple[str, ...], Array, list[ClipFile]]] = []
     for clip in clips:
         names, offsets = read_skeleton(clip.path)
