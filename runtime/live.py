@@ -6,7 +6,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from lobstr_hw.calibration.profile import load_profile
 from lobstr_hw.drivers.driver import TrackerDriver
 from lobstr_hw.drivers.replay import ReplayDriver
 from lobstr_hw.errors import OutputError
@@ -18,6 +17,7 @@ from lobstr_hw.runtime.loop import run
 from lobstr_hw.runtime.outputs.output import Output
 from lobstr_hw.runtime.outputs.queued import QueuedOutput
 from lobstr_hw.runtime.outputs.sinks import SinkSpec, make_output
+from lobstr_hw.runtime.profiles import chosen_profile
 from lobstr_hw.runtime.roles import RoleTable
 from lobstr_hw.runtime.session import Session
 from lobstr_hw.runtime.status import Snapshot, StatusLine
@@ -111,8 +111,8 @@ class LiveSession:
     def _build(self) -> None:
         options = self.options
         predictor = load_predictor(options.predictor)
-        profile = None if options.profile is None else load_profile(options.profile)
         self._open.enter_context(self.driver)
+        profile = chosen_profile(options.profile, self.driver, self.tell)
         table = RoleTable(None if profile is None else profile.roles, self.driver.devices)
         self.feed = Feed(predictor.card.accepts, table)
         self.watcher = TPoseWatcher(table)
@@ -151,7 +151,8 @@ class LiveSession:
 
     def _last_tick(self) -> int | None:
         end_s = self._end_s()
-        return None if end_s is None else int(end_s * self.options.rate_hz + 1e-9)
+        # logs round times down to whole nanoseconds
+        return None if end_s is None else int(end_s * self.options.rate_hz + 1e-6)
 
     def _open_outputs(self, table: RoleTable) -> None:
         for spec in self.options.outputs:

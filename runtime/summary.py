@@ -15,7 +15,7 @@ from lobstr_hw.skeleton import PARENTS, Body, Joint
 from lobstr_hw.skeleton_pose import SkeletonPose
 from lobstr_hw.trackers import TrackerRole
 
-__all__ = ["Summary", "Tally", "percentiles", "write_summary"]
+__all__ = ["Summary", "Tally", "check_summary_path", "percentiles", "write_summary"]
 
 TOES = [Joint.LEFT_TOES, Joint.RIGHT_TOES]
 
@@ -152,6 +152,17 @@ def percentiles(values_ms: "array[float]") -> dict[str, float | None]:
         return {"p50": None, "p99": None, "max": None}
     found = np.percentile(np.array(values_ms), (50, 99, 100)).round(4).tolist()
     return dict(zip(("p50", "p99", "max"), found, strict=True))
+
+
+def check_summary_path(path: Path) -> None:
+    """See that a summary could be written there, before an hour's session ends without one.
+
+    Raises:
+        OutputError: the folder is missing, or the path is one.
+    """
+    if path.is_dir() or not path.parent.is_dir():
+        what = "is a folder" if path.is_dir() else f"needs the folder {path.parent}; make it first"
+        raise OutputError(f"cannot write the summary: {path} {what}.")
 
 
 def write_summary(path: Path, summary: Summary) -> None:

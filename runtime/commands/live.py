@@ -121,8 +121,10 @@ def _check(parser: argparse.ArgumentParser, args: argparse.Namespace) -> None:
 
 def _run(args: argparse.Namespace, stop: StopRequest) -> int:
     from lobstr_hw.runtime.live import LiveSession
-    from lobstr_hw.runtime.summary import write_summary
+    from lobstr_hw.runtime.summary import check_summary_path, write_summary
 
+    if args.summary is not None:
+        check_summary_path(args.summary)
     driver = _driver(args)
     if driver is None:
         return 2
