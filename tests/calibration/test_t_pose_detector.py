@@ -9,7 +9,6 @@ from support.motions import arms_down, walking
 
 from lobstr_hw.calibration import TPoseDetector
 from lobstr_hw.errors import MissingRole, TPoseNotFound
-from lobstr_hw.motion import Motion
 from lobstr_hw.poses import PartialPose
 from lobstr_hw.rotations import rotation_x
 from lobstr_hw.simulation import SimulatedTake, TrackingErrors, simulate, take_samples
