@@ -49,10 +49,13 @@ def quality(track: TrackerTrack) -> Quality:
 
 
 def sample_rate(times_s: Array) -> float:
-    """Samples per second by the median distance; 0 for fewer than two."""
+    """Samples per second by the median distance, to 0.001 Hz; 0 for fewer than two.
+
+    Times are whole nanoseconds, so more digits than these would be noise.
+    """
     steps = np.diff(times_s)
     steps = steps[steps > 0.0]
-    return float(1.0 / np.median(steps)) if len(steps) else 0.0
+    return round(float(1.0 / np.median(steps)), 3) if len(steps) else 0.0
 
 
 def dropouts(track: TrackerTrack) -> Array:
