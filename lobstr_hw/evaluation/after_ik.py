@@ -26,7 +26,7 @@ class Shown:
     """What the avatar showed over a clip.
 
     Attributes:
-        joints: (frames, 2, 4, 3, 3): C of the network, U that takes it to the shown upper leg, L, F.
+        joints: (frames, 2, 4, 3, 3): C of the network, the U that makes the shown upper leg, L, F.
         p_toes: (frames, 2, 3) in the world.
         locked: (frames, 2).
     """
@@ -66,12 +66,11 @@ def show(
     for group in groups_of_like_length(clips):
         members = [clips[i] for i in group]
         script = _Scripted(card, _side_by_side([said[i] for i in group]))
-        shown = _run(script, members, count)
+        R_local, p_toes, locked = _run(script, members, count)
         for k, i in enumerate(group):
             frames = slice(len(clips[i]))
-            R_local, p_toes, locked = (values[frames, k] for values in shown)
-            joints = _joints(R_local, said[i].C, clips[i].R_ref)
-            out[i] = Shown(joints, p_toes, locked)
+            joints = _joints(R_local[frames, k], said[i].C, clips[i].R_ref)
+            out[i] = Shown(joints, p_toes[frames, k], locked[frames, k])
     return [out[i] for i in range(len(clips))]
 
 

@@ -2,8 +2,8 @@
 
 Contact accuracy: share of frames and feet with the right label. Balanced accuracy: mean of the two
 recalls. Rotation error: mean geodesic angle over C, U, L, F of both sides; legs-only without C.
-Position error: of the toe bases, the truth's root and heading given. Velocity error: mean norm of the
-difference of the toe bases' velocities. Skate: horizontal toe-base speed while the truth is in
+Position error: of the toe bases, the truth's root and heading given. Velocity error: mean norm of
+the difference of the toe bases' velocities. Skate: horizontal toe-base speed while the truth is in
 contact. Jitter ratio: mean norm of the third difference of the toe bases over the truth's.
 Penetration: mean depth of the lowest of heel, toe base and tip under the floor. Lengths are of the
 standard skeleton (hips at 1.0 m).

@@ -8,9 +8,18 @@ from typing import Any, Literal
 from lobstr_hw.errors import ModelError
 from lobstr_hw.features import Form
 from lobstr_hw.training.augmentation import Augmentation
-from lobstr_hw.training.losses import LossWeights
 
-__all__ = ["TrainingConfig", "read_config", "write_config"]
+__all__ = ["LossWeights", "TrainingConfig", "read_config", "write_config"]
+
+
+@dataclass(frozen=True, slots=True)
+class LossWeights:
+    """The paper's lambda 1 to 4."""
+
+    pose: float = 1.0
+    toe: float = 0.1
+    velocity: float = 0.1
+    contact: float = 1e-6
 
 
 @dataclass(frozen=True, slots=True)

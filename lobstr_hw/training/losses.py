@@ -10,19 +10,10 @@ import torch
 from torch import Tensor
 from torch.nn.functional import cross_entropy
 
+from lobstr_hw.training.config import LossWeights
 from lobstr_hw.training.kinematics import toes_in_reference
 
-__all__ = ["LossWeights", "Losses", "Targets", "losses"]
-
-
-@dataclass(frozen=True, slots=True)
-class LossWeights:
-    """The paper's lambda 1 to 4."""
-
-    pose: float = 1.0
-    toe: float = 0.1
-    velocity: float = 0.1
-    contact: float = 1e-6
+__all__ = ["Losses", "Targets", "losses"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -135,7 +135,7 @@ def _score(name: str, predictor: Any, clips: list[Truth], mode: Mode) -> list[Cl
     def count(more: int) -> None:
         nonlocal done
         before, done = done, done + more
-        if 20 * before // frames != 20 * done // frames:
+        if 10 * before // frames != 10 * done // frames:
             _say(f"{name} {mode}: {100 * done // frames} %")
 
     return evaluate(predictor, clips, mode, count)
