@@ -47,7 +47,7 @@ class ReplayDriver(TrackerDriver):
         Raises:
             LogFileError: no such file, not a log, or no tracker in it.
         """
-        self._log = read_log(self.path)
+        self._log = read_log(self.path, skeleton=False)
         self._samples = self._log.samples()
         self._next = next(self._samples, None)
         self._events = _all_events(self._log)
@@ -55,7 +55,7 @@ class ReplayDriver(TrackerDriver):
 
     @property
     def log(self) -> TrackerLog:
-        """What is being replayed: its truth, T-pose and how it ended; between open and close."""
+        """What is being replayed, without its skeletons; between open and close."""
         if self._log is None:
             raise RuntimeError("the replay driver is not open")
         return self._log

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from lobstr_hw.drivers.tracker_log.schemas import WORLD_FRAME
-from lobstr_hw.rotations import Array, from_quat_xyzw, to_quat_xyzw, transpose
+from lobstr_hw.rotations import Array, to_quat_xyzw, transpose
 from lobstr_hw.skeleton import HUMANOID_NAMES, PARENTS, global_rotations
 from lobstr_hw.skeleton_pose import SkeletonPose
 from lobstr_hw.trackers import TrackerRole, TrackerSample, TrackingState
@@ -24,6 +25,7 @@ __all__ = [
     "DeviceState",
     "PoseReading",
     "SkeletonReading",
+    "TruthReading",
     "nanoseconds",
     "pose_message",
     "read_pose",
@@ -78,6 +80,14 @@ class SkeletonReading:
     quat_xyzw: Array
     contact: tuple[bool, ...]
     roles: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TruthReading:
+    """One truth message: joints (22, 3), and quaternions (22, 4) in steps, as they are stored."""
+
+    p_world: npt.NDArray[np.float32]
+    quat_steps: npt.NDArray[np.int16] | None
 
 
 def nanoseconds(time_s: float) -> int:
@@ -236,11 +246,11 @@ def truth_message(time_ns: int, p_world: Array, R_world: Array | None) -> bytes:
     return f'{{"timestamp":{_stamp(time_ns)},"p_world":"{p}"{rotations}}}'.encode()
 
 
-def read_truth(data: bytes) -> tuple[Array, Array | None]:
-    """World joints (22, 3) and rotations (22, 3, 3) or None."""
+def read_truth(data: bytes) -> TruthReading:
+    """The inverse of :func:`truth_message`."""
     message = json.loads(data)
     p = np.frombuffer(base64.b64decode(message["p_world"]), "<f4").reshape(22, 3)
     if "quat_xyzw" not in message:
-        return p.astype(np.float64), None
+        return TruthReading(p, None)
     q = np.frombuffer(base64.b64decode(message["quat_xyzw"]), "<i2").reshape(22, 4)
-    return p.astype(np.float64), from_quat_xyzw(q.astype(np.float64))
+    return TruthReading(p, q)

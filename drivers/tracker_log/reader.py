@@ -16,6 +16,7 @@ from lobstr_hw.drivers.tracker_log.messages import (
     DeviceState,
     PoseReading,
     SkeletonReading,
+    TruthReading,
     read_pose,
     read_skeleton,
     read_state,
@@ -39,14 +40,18 @@ __all__ = ["read_log"]
 _NAN = math.nan
 
 
-def read_log(path: str | Path) -> TrackerLog:
+def read_log(path: str | Path, skeleton: bool = True) -> TrackerLog:
     """Read a log; a cut or damaged one as far as it goes (``damage`` tells why it ended).
+
+    Args:
+        path: of the file.
+        skeleton: read the bodies that were sent out, too; they are most of a long recording.
 
     Raises:
         LogFileError: no such file, not MCAP, or no tracker in it.
     """
     file = RecordFile(Path(path))
-    content = _Content()
+    content = _Content(skeleton)
     for count, record in enumerate(file):
         try:
             content.add(record)
@@ -140,11 +145,12 @@ def _column(
 class _Content:
     """Sorts records by topic."""
 
-    def __init__(self) -> None:
+    def __init__(self, with_skeleton: bool) -> None:
+        self.with_skeleton = with_skeleton
         self.schemas: dict[int, str] = {}
         self.topics: dict[int, tuple[str, str]] = {}  # and the name of the schema
         self.trackers: dict[str, _TrackRows] = {}
-        self.truth: list[tuple[int, Array, Array | None]] = []
+        self.truth: list[tuple[int, TruthReading]] = []
         self.skeleton: list[tuple[int, SkeletonReading]] = []
         self.metadata: dict[str, dict[str, str]] = {}
         self.profile: bytes | None = None
@@ -169,9 +175,10 @@ class _Content:
         elif serial and schema == schemas.TRACKER_STATE:
             self._rows(serial).add_state(time_ns, data)
         elif (topic, schema) == (schemas.TRUTH_TOPIC, schemas.TRUTH):
-            self.truth.append((time_ns, *read_truth(data)))
+            self.truth.append((time_ns, read_truth(data)))
         elif (topic, schema) == (schemas.SKELETON_TOPIC, schemas.FRAME_TRANSFORMS):
-            self.skeleton.append((time_ns, read_skeleton(data)))
+            if self.with_skeleton:
+                self.skeleton.append((time_ns, read_skeleton(data)))
 
     def _rows(self, serial: str) -> _TrackRows:
         return self.trackers.setdefault(serial, _TrackRows(serial))
@@ -218,12 +225,13 @@ class _Content:
     def _truth_track(self, start_ns: int) -> TruthTrack | None:
         if not self.truth:
             return None
-        times, p, R = zip(*self.truth, strict=True)
-        turned = [r for r in R if r is not None]
+        times, readings = zip(*self.truth, strict=True)
+        steps = [r.quat_steps for r in readings if r.quat_steps is not None]
+        whole = len(steps) == len(readings)
         return TruthTrack(
             (np.array(times) - start_ns) / 1e9,
-            np.stack(p),
-            np.stack(turned) if len(turned) == len(p) else None,
+            np.stack([r.p_world for r in readings]).astype(np.float64),
+            from_quat_xyzw(np.stack(steps).astype(np.float64)) if whole else None,
         )
 
     def _skeleton_track(self, start_ns: int) -> SkeletonTrack | None:
