@@ -33,7 +33,7 @@ def plot_results(folder: Path, results: Sequence[ClipResult]) -> None:
                 for r in results
                 if (value := getattr(r, stage).scores()[metric]) is not None
             ]
-            axes.plot(*zip(*points, strict=True), marker, label=stage) if points else None
+            axes.plot([x for x, _ in points], [y for _, y in points], marker, label=stage)
         axes.set_yticks(range(len(folders)), folders)
         axes.set_xlabel(f"{title}, a mark per clip")
         axes.legend()

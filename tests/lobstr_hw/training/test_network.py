@@ -28,7 +28,8 @@ def poses() -> Array:
 
 
 def batch(joints: Array) -> "Tensor":
-    return torch.from_numpy(pose_6d(joints).astype(np.float32))
+    pose: Tensor = torch.from_numpy(pose_6d(joints).astype(np.float32))
+    return pose
 
 
 def targets(pose: "Tensor", contact: int = 1) -> "Targets":
