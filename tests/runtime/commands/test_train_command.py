@@ -24,7 +24,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
         walk = walking(6.0, seed=seed)
         path = root / "made" / "clips" / f"walk_{seed}.bvh"
         write_bvh(path, walk.p_hips, walk.R_local, walk.rate_hz)
-    parts = dict.fromkeys(PARTS, [])
+    parts: dict[str, list[str]] = {part: [] for part in PARTS}
     split = {**parts, "train": ["made/walk_0", "made/walk_1"], "validation": ["made/walk_2"]}
     (root / "split.json").write_text(json.dumps(split), encoding="utf-8")
     config = {"steps": 4, "batch": 8, "hidden_size": 16, "validation_windows": 8}
