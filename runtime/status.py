@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
 
-from rich.console import Console, RenderableType
+from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
@@ -52,15 +52,17 @@ class Snapshot:
 
 
 def render(now: Snapshot, before: Snapshot | None = None) -> RenderableType:
-    """One row: the rate since the snapshot before, trackers, contacts, trouble, progress."""
-    grid = Table.grid(padding=(0, 2))
+    """Two rows: progress, the rate since the snapshot before and trouble; then the trackers."""
     cells: list[RenderableType] = [_progress(now), _rate(now, before), _calibration(now)]
-    cells += [_roles(now.pose), _contacts(now.pose), _trouble(now)]
+    cells += [_contacts(now.pose), _trouble(now)]
     if now.total_s is not None:
         share = min(now.elapsed_s / max(now.total_s, 1e-9), 1.0)
-        cells.insert(0, ProgressBar(total=1.0, completed=share, width=20))
+        cells.insert(0, ProgressBar(total=1.0, completed=share, width=16))
+    grid = Table.grid(padding=(0, 2))
+    for _ in cells:
+        grid.add_column(no_wrap=True)
     grid.add_row(*cells)
-    return grid
+    return Group(grid, _roles(now.pose))
 
 
 def _progress(now: Snapshot) -> Text:

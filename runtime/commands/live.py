@@ -84,8 +84,15 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number") from error
+
+
 def _rate(text: str) -> float:
-    rate_hz = float(text)
+    rate_hz = _number(text)
     low, high = RATES_HZ
     if not low <= rate_hz <= high:
         raise argparse.ArgumentTypeError(f"{text} Hz is not between {low:g} and {high:g}")
@@ -93,7 +100,7 @@ def _rate(text: str) -> float:
 
 
 def _positive(text: str) -> float:
-    value = float(text)
+    value = _number(text)
     if not 0.0 <= value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not a number of 0 or more")
     return value

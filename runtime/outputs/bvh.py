@@ -1,6 +1,7 @@
 """``bvh:FILE``: a motion file for Blender, Maya, MotionBuilder and the like, in centimetres."""
 
-from collections.abc import Sequence
+from array import array
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -21,6 +22,26 @@ BATCH_S = 0.5
 whole file that lacks at most this much."""
 
 
+class _Waiting:
+    """Frames before the calibration; small, for it may be hours away and nobody moves meanwhile."""
+
+    def __init__(self) -> None:
+        self._p = array("d")
+        self._runs: list[tuple[int, Array]] = []  # each array of rotations with its first frame
+
+    def add(self, p_hips: Array, R_local: Array) -> None:
+        if not self._runs or self._runs[-1][1] is not R_local:
+            self._runs.append((len(self._p) // 3, R_local))
+        self._p.extend(p_hips.tolist())
+
+    def __iter__(self) -> Iterator[tuple[Array, Array]]:
+        p = np.array(self._p).reshape(-1, 3)
+        starts = [first for first, _ in self._runs] + [len(p)]
+        for (first, R_local), end in zip(self._runs, starts[1:], strict=True):
+            for i in range(first, end):
+                yield p[i], R_local[0]
+
+
 class BvhOutput:
     """Writes the skeleton at the first calibration, and gives the frames before it the same body.
 
@@ -33,7 +54,7 @@ class BvhOutput:
         self._file: BinaryIO | None = None
         self._lines: list[str] = []
         self._frames = 0
-        self._early: list[tuple[Array, Array]] = []
+        self._early = _Waiting()
         self._written = False
 
     def open(self, body: Body, rate_hz: float, take: str) -> None:
@@ -50,15 +71,14 @@ class BvhOutput:
         self._begin()
         for p_hips, R_local in self._early:
             self._add(p_hips * (1.0, grown, 1.0), R_local)
-        self._early.clear()
+        self._early = _Waiting()
 
     def send(self, pose: SkeletonPose, samples: Sequence[TrackerSample]) -> None:
         """One frame."""
-        p_hips, R_local = pose.p_world[0, 0], pose.R_local[0]
         if self._written:
-            self._add(p_hips, R_local)
+            self._add(pose.p_world[0, 0], pose.R_local[0])
         else:
-            self._early.append((p_hips, R_local))
+            self._early.add(pose.p_world[0, 0], pose.R_local)
 
     def close(self) -> None:
         """Write the last frames; without a calibration, all of them on the standard body."""

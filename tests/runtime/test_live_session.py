@@ -1,3 +1,4 @@
+import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ from lobstr_hw.calibration.profile import profile_to_json
 from lobstr_hw.drivers.fake import FakeDriver
 from lobstr_hw.drivers.replay import ReplayDriver
 from lobstr_hw.drivers.tracker_log import TrackerLogWriter
+from lobstr_hw.errors import OutputError
 from lobstr_hw.rotations import geodesic_angle
 from lobstr_hw.runtime.live import LiveOptions, LiveSession
 from lobstr_hw.runtime.many_drivers import ManyDrivers
@@ -245,3 +247,20 @@ def test_parts_of_the_body_may_come_from_different_drivers(
     assert live.session.calibrated
     times = [sample.time_s for sample in capture.samples]
     assert times == sorted(times)
+
+
+def test_a_stop_before_the_first_tick_is_an_empty_session(log: Path) -> None:
+    with LiveSession(ReplayDriver(log), QUICK, print) as live:
+        live.run(lambda: True)
+    summary = live.summary()
+    assert summary.frames == 0
+    assert summary.tick_ms == {"p50": None, "p99": None, "max": None}
+
+
+def test_what_was_open_is_closed_when_a_later_part_fails(log: Path, tmp_path: Path) -> None:
+    sinks = (parse_sink(f"ndjson:{tmp_path / 'a'}"), parse_sink(f"bvh:{tmp_path / 'no' / 'b'}"))
+    driver = ReplayDriver(log)
+    with pytest.raises(OutputError), LiveSession(driver, replace(QUICK, outputs=sinks), print):
+        raise AssertionError("it must not get here")
+    assert not driver.devices()
+    assert str(sinks[0]) not in {thread.name for thread in threading.enumerate()}
