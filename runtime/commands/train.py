@@ -1,6 +1,7 @@
 """lobstr-train: train the network, or export a run."""
 
 import argparse
+import json
 import sys
 import time
 from collections.abc import Iterable, Sequence
@@ -8,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lobstr_hw.errors import LobstrError, ModelError
+from lobstr_hw.training.requirements import require_training_libraries
 
 if TYPE_CHECKING:
     from lobstr_hw.training.checkpoint import Run
@@ -32,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.data and not options.out:
         parser.error("--out DIR is needed: where the run is kept")
     try:
-        _require_torch()
+        require_training_libraries()
         return _export(options) if options.export else _train(options)
     except LobstrError as error:
         print(f"lobstr-train: {error}", file=sys.stderr)
@@ -62,17 +64,6 @@ def _parser() -> argparse.ArgumentParser:
         "--export", nargs=2, type=Path, metavar=("DIR", "OUT"), help="write weights"
     )
     return parser
-
-
-def _require_torch() -> None:
-    try:
-        import onnx  # noqa: F401
-        import torch  # noqa: F401
-    except ImportError as error:
-        raise ModelError(
-            f"{error.name!r} is not installed: training needs it. "
-            "pip install torch==2.13.0 'lobstr-hw[train]'"
-        ) from error
 
 
 def _export(options: argparse.Namespace) -> int:
@@ -172,8 +163,6 @@ def _retargeting_bar(motions: Iterable[Any], total: int) -> Iterable[Any]:
 
 
 def _write_json(path: Path, document: dict[str, object]) -> None:
-    import json
-
     path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
 
