@@ -8,7 +8,7 @@ from lobstr_hw.ik.vectors import length, rotate, swing, unit
 from lobstr_hw.rotations import Array
 from lobstr_hw.skeleton import HEEL, STANDARD_OFFSETS, TOE_BASE_HEIGHT, TOE_TIP, Body, Joint
 
-__all__ = ["FootShape", "above_floor", "raised"]
+__all__ = ["FootShape", "above_floor", "raised", "toes_on_floor"]
 
 FEET = [Joint.LEFT_FOOT, Joint.RIGHT_FOOT]
 TOES = [Joint.LEFT_TOES, Joint.RIGHT_TOES]
@@ -66,11 +66,10 @@ def raised(v: Array, least_y: Array, sideways: Array) -> Array:
     return swing(unit(v), unit(np.where(low[..., None], wanted, v)))
 
 
-def above_floor(toe: Array, R_foot: Array, shape: FootShape) -> tuple[Array, Array, Array]:
-    """Toe base, foot and toes as near as possible to those given and nowhere under the floor.
+def above_floor(toe: Array, R_foot: Array, shape: FootShape) -> tuple[Array, Array]:
+    """Toe base and foot as near as can be to those given, the heel not under the floor.
 
-    The toe base is lifted straight up. The foot then turns about it until the heel is up, and the
-    toes, which have no rotation of their own, bend up at push-off.
+    The toe base is lifted straight up; the foot then turns about it until the heel is up.
 
     Args:
         toe: toe bases wanted (n, 2, 3).
@@ -78,15 +77,18 @@ def above_floor(toe: Array, R_foot: Array, shape: FootShape) -> tuple[Array, Arr
         shape: of the feet.
 
     Returns:
-        toe (n, 2, 3), R_foot, R_toes (n, 2, 3, 3) in the world.
+        toe (n, 2, 3), R_foot (n, 2, 3, 3).
     """
     toe = np.array(toe)
     toe[..., 1] = np.maximum(toe[..., 1], shape.ball_m)
     R_foot = raised(rotate(R_foot, shape.heel), -toe[..., 1], -R_foot[..., :, 1]) @ R_foot
-    return toe, R_foot, toes_on_floor(toe, R_foot, shape)
+    return toe, R_foot
 
 
 def toes_on_floor(toe: Array, R_foot: Array, shape: FootShape) -> Array:
-    """Toes in the world: as the foot, bent up where their tip would go under the floor."""
+    """Toes in the world: as the foot, bent up where their tip would go under the floor.
+
+    Nothing predicts the toes; at push-off they stay on the floor.
+    """
     tip = rotate(R_foot, shape.tip)
     return np.asarray(raised(tip, shape.tip_m - toe[..., 1], R_foot[..., :, 1]) @ R_foot)

@@ -7,7 +7,7 @@ import numpy as np
 from lobstr_hw.contact import ContactLock, LockSettings, follow, release, toe_target
 from lobstr_hw.floor import FootShape, above_floor, toes_on_floor
 from lobstr_hw.ik.jacobian import LegBones, LegPose, solve_legs
-from lobstr_hw.ik.vectors import length, rotate
+from lobstr_hw.ik.vectors import length, rotate, unit
 from lobstr_hw.predictors.predictor import Bools
 from lobstr_hw.rotations import Array
 from lobstr_hw.skeleton import Body, Joint
@@ -18,6 +18,9 @@ UPPER = [Joint.LEFT_UPPER_LEG, Joint.RIGHT_UPPER_LEG]
 LOWER = [Joint.LEFT_LOWER_LEG, Joint.RIGHT_LOWER_LEG]
 FEET = [Joint.LEFT_FOOT, Joint.RIGHT_FOOT]
 TOES = [Joint.LEFT_TOES, Joint.RIGHT_TOES]
+
+FOLDED = 0.26
+"""Hip to ankle over the leg's length, the knee folded to about 150 degrees."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,15 +85,35 @@ def pose_legs(
     has_tracker = np.zeros_like(lock.on)
     if tracked is not None:
         has_tracker = tracked.valid
-        seen = tracked.valid[..., None]
+        seen = has_tracker[..., None]
         toe = np.where(seen, tracked.p + rotate(tracked.R, body.bones.foot), toe)
         R_foot = np.where(seen[..., None], tracked.R, R_foot)
         lock = replace(lock, since_release_s=np.where(has_tracker, 1e6, lock.since_release_s))
-    target = toe_target(lock, toe, dt_s, settings)
-    opens = release(lock, target, toe, p_hip, contact, body.reach_m, has_tracker, settings)
-    target, R_foot, _ = above_floor(target, R_foot, body.shape)
+    held = toe_target(lock, toe, dt_s, settings)
+    target, R_foot = above_floor(held, R_foot, body.shape)
+    target, crowded = clear_of_hip(target, R_foot, p_hip, body)
+    opens = release(lock, held, toe, p_hip, contact, body.reach_m, has_tracker, settings)
+    opens |= lock.on & crowded
     lock = follow(lock, target, opens, ~has_tracker, dt_s, body.shape.ball_m, settings)
-    start = LegPose(network.upper, network.lower, R_foot)
-    pose = solve_legs(start, p_hip, body.bones, target)
+    pose = solve_legs(LegPose(network.upper, network.lower, R_foot), p_hip, body.bones, target)
     reached = pose.toe(p_hip, body.bones)
     return lock, pose, toes_on_floor(reached, pose.foot, body.shape)
+
+
+def clear_of_hip(toe: Array, R_foot: Array, p_hip: Array, body: LegBody) -> tuple[Array, Bools]:
+    """Toe bases moved sideways off the hip joints where a knee cannot fold so far.
+
+    Low over the floor the network's foot may come to be under the hip itself. A knee folds to
+    about 150 degrees; nearer than that the foot gives way along the floor.
+
+    Returns:
+        toe (n, 2, 3), and which were moved (n, 2).
+    """
+    v = toe - rotate(R_foot, body.bones.foot) - p_hip
+    least = FOLDED * (length(body.bones.upper) + length(body.bones.lower))[..., 0]
+    flat = v * np.array([1.0, 0.0, 1.0])
+    away = flat + 1e-3 * R_foot[..., :, 2] * np.array([1.0, 0.0, 1.0])
+    need = np.sqrt(np.maximum(least**2 - v[..., 1] ** 2, 0.0))
+    near = length(flat)[..., 0] < need
+    moved = toe + unit(away) * need[..., None] - flat
+    return np.where(near[..., None], moved, toe), near

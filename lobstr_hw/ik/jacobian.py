@@ -5,17 +5,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from lobstr_hw.ik.two_bone import bend_and_swing
-from lobstr_hw.ik.vectors import cross, dot, rotate, turn
+from lobstr_hw.ik.vectors import cross, dot, length, rotate, turn
 from lobstr_hw.rotations import Array
 
 __all__ = ["LegBones", "LegPose", "solve_legs"]
 
-TOLERANCE_M = 2e-5
+TOLERANCE_M = 2e-7
 DAMPING = 1e-5
 """Squared, in metres: far under the levers' 0.01 to 0.9, so a step in reach is nearly Newton's."""
 
 FOOT_WEIGHT = 0.5
 """Of a turn of the foot against a turn of hip or knee; only stretched legs turn it at all."""
+
+FULL_REACH = 0.995
+"""Of the stretched leg's length; beyond it the levers are all but parallel."""
 
 STEP_LIMIT = 0.5
 """Radians per iteration: the Jacobian is a good guide no further."""
@@ -64,6 +67,7 @@ def solve_legs(
     Returns:
         The pose; out of reach, the leg points at the target.
     """
+    target = _in_reach(target, p_hip, bones)
     pose = _with_foot_held(pose, p_hip, bones, target)
     for _ in range(iterations):
         error = target - pose.toe(p_hip, bones)
@@ -72,6 +76,13 @@ def solve_legs(
             break
         pose = _step(pose, bones, np.where(active, error, 0.0))
     return pose
+
+
+def _in_reach(target: Array, p_hip: Array, bones: LegBones) -> Array:
+    """Targets (n, 2, 3) no further from the hip than the stretched leg can be, on the same line."""
+    line = target - p_hip
+    reach = length(bones.upper) + length(bones.lower) + length(bones.foot)
+    return p_hip + line * np.minimum(FULL_REACH * reach / np.maximum(length(line), 1e-9), 1.0)
 
 
 def _with_foot_held(pose: LegPose, p_hip: Array, bones: LegBones, target: Array) -> LegPose:
@@ -98,7 +109,7 @@ def _step(pose: LegPose, bones: LegBones, error: Array) -> LegPose:
     turns = np.stack(
         [cross(hip_lever, y), hinge * dot(knee, y), FOOT_WEIGHT * cross(foot_lever, y)], axis=0
     )
-    R = turn(np.clip(turns, -STEP_LIMIT, STEP_LIMIT))
+    R = turn(turns * np.minimum(STEP_LIMIT / np.maximum(length(turns), 1e-9), 1.0))
     return LegPose(R[0] @ pose.upper, R[0] @ (R[1] @ pose.lower), R[2] @ pose.foot)
 
 

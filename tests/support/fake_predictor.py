@@ -20,11 +20,13 @@ STANCE = 0.6
 class FakePredictor:
     """Legs swing with the distance the hips have gone; a standing person stands.
 
-    ``roles`` may be more than the four points: the card accepts them.
+    ``roles`` may be more than the four points: the card accepts them. ``contacts`` False: no foot
+    is ever said to be on the floor.
     """
 
     roles: tuple[TrackerRole, ...] = FOUR_POINTS
     delay_frames: int = 0
+    contacts: bool = True
 
     @property
     def card(self) -> ModelCard:
@@ -40,7 +42,7 @@ class FakePredictor:
                 for side in ("LEFT", "RIGHT")
                 for bone in ("UPPER_LEG", "LOWER_LEG", "FOOT")
             ),
-            contacts=True,
+            contacts=self.contacts,
             feature_version=1,
             skeleton_version=SKELETON_VERSION,
         )
@@ -56,7 +58,7 @@ class FakePredictor:
         speed = np.where(state["begun"], step * 45.0, 0.0)
         phase = gone_m[:, None] / STRIDE_M + np.array([0.0, 0.5])  # (n, 2)
         new = {"p": p, "gone_m": gone_m, "begun": np.ones_like(state["begun"])}
-        return new, Prediction(_legs(phase, speed), _contact(phase, speed))
+        return new, Prediction(_legs(phase, speed), self.contacts * _contact(phase, speed))
 
     def shift_world(self, state: State, T: Array) -> State:
         p = (T[:, :3, :3] @ state["p"][..., None])[..., 0] + T[:, :3, 3]
