@@ -1,6 +1,7 @@
 """The card of a finished run, and its export."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from lobstr_hw.training.config import TrainingConfig, read_config
 from lobstr_hw.training.dataset import RATE_HZ
 from lobstr_hw.training.export import ExportError, export_network
 from lobstr_hw.training.network import parameter_count
+from lobstr_hw.training.sources import notices
 
 __all__ = ["export_run", "network_card"]
 
@@ -50,21 +52,29 @@ def network_card(run: Run, config: TrainingConfig, details: dict[str, Any]) -> N
     )
 
 
-def export_run(folder: Path, out: Path) -> ExportError:
+def export_run(folder: Path, out: Path, metrics: Mapping[str, Path] | None = None) -> ExportError:
     """Write the weights of a run's newest checkpoint as ``out`` (.onnx) with its card.
 
+    Args:
+        folder: of the run.
+        out: the ONNX file.
+        metrics: name -> a document of lobstr-evaluate, whose totals go on the card.
+
     Raises:
-        ModelError: the folder is no run.
+        ModelError: the folder is no run, or a document cannot be read.
     """
     config = read_config(folder / "config.json")
     run = load_checkpoint(folder / "checkpoint.pt", config)
+    data = _read_json(folder / "data.json")
     details = {
         "architecture": f"GRU {config.hidden_size}, Linear 128 + ReLU, heads 48 and 4",
         "parameters": parameter_count(run.network),
         "steps_done": run.step,
         "wall_s": round(run.wall_s),
-        "data": _read_data(folder / "data.json"),
+        "data": data,
+        "licences": notices(data.get("minutes_by_set", {})),
         "configuration": asdict(config),
+        "metrics": {k: _read_json(p).get("all", {}) for k, p in (metrics or {}).items()},
     }
     error = export_network(run.network, network_card(run, config, details), out)
     details["float16_storage_error"] = asdict(error)
@@ -72,10 +82,11 @@ def export_run(folder: Path, out: Path) -> ExportError:
     return error
 
 
-def _read_data(path: Path) -> dict[str, Any]:
+def _read_json(path: Path) -> dict[str, Any]:
     try:
         return dict(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError) as error:
         raise ModelError(
-            f"{path}: the run does not say what it was trained on ({error})."
+            f"{path}: cannot be read ({error}). A run has a data.json; --metrics takes what "
+            "lobstr-evaluate printed."
         ) from error

@@ -31,6 +31,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if bool(options.export) == bool(options.data):
         parser.error("give DATA... to train on, or --export DIR OUT")
+    if any("=" not in named for named in options.metrics):
+        parser.error("--metrics takes NAME=FILE")
     if options.data and not options.out:
         parser.error("--out DIR is needed: where the run is kept")
     try:
@@ -63,6 +65,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--export", nargs=2, type=Path, metavar=("DIR", "OUT"), help="write weights"
     )
+    parser.add_argument(
+        "--metrics",
+        action="append",
+        default=[],
+        metavar="NAME=FILE",
+        help="with --export: a document of lobstr-evaluate for the card (repeatable)",
+    )
     return parser
 
 
@@ -72,7 +81,8 @@ def _export(options: argparse.Namespace) -> int:
     folder, out = options.export
     if out.suffix != ".onnx":
         out = out / "lobstr.onnx"
-    error = export_run(folder, out)
+    metrics = dict(named.split("=", 1) for named in options.metrics)
+    error = export_run(folder, out, {name: Path(file) for name, file in metrics.items()})
     print(f"wrote {out} and {out.with_suffix('.json').name}")
     print(f"storing float16 moves the pose by at most {error.pose:.1e}", file=sys.stderr)
     return 0

@@ -147,8 +147,10 @@ def export(clips: Clips, folder: Path) -> Path:
 
     write_config(folder / "config.json", SMALL)
     save_checkpoint(folder / "checkpoint.pt", trained(clips, SMALL))
-    (folder / "data.json").write_text(json.dumps({"split": "made"}), encoding="utf-8")
-    export_run(folder, folder / "net.onnx")
+    data = {"split": "made", "minutes_by_set": {"snu_ys2010": 1.0, "mine": 1.0}}
+    (folder / "data.json").write_text(json.dumps(data), encoding="utf-8")
+    (folder / "scores.json").write_text(json.dumps({"all": {"network": 1}}), encoding="utf-8")
+    export_run(folder, folder / "net.onnx", {"test": folder / "scores.json"})
     return folder / "net.onnx"
 
 
@@ -171,7 +173,10 @@ def test_the_exported_files_are_a_predictor_with_the_runs_story(
     card = load_predictor(str(export(clips, tmp_path))).card
     assert card.details["steps_done"] == 12
     assert card.details["configuration"]["seed"] == SMALL.seed
-    assert card.details["data"] == {"split": "made"}
+    assert card.details["data"]["split"] == "made"
+    assert "Apache-2.0" in card.details["licences"]["snu_ys2010"]
+    assert card.details["licences"]["mine"] == "not known to this project"
+    assert card.details["metrics"] == {"test": {"network": 1}}
     assert card.details["float16_storage_error"]["pose"] > 0.0
 
 
