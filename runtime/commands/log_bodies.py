@@ -25,6 +25,8 @@ from lobstr_hw.trackers import TrackerRole
 __all__ = ["Bodies", "bodies_of"]
 
 _LEG = [Joint.LEFT_LOWER_LEG, Joint.LEFT_FOOT]
+ROUNDING = 1e-4
+"""Legs of the same body differ by less, after the rounding of the file."""
 _TOES = [Joint.LEFT_TOES, Joint.RIGHT_TOES]
 
 
@@ -86,9 +88,12 @@ def bodies_of(log: TrackerLog) -> Bodies:
 
 
 def _recorded(skeleton: SkeletonTrack) -> Bodies:
-    # frames before the calibration stand on the standard body: the last frame has the user's
+    # frames before the calibration have the standard body: give them the user's, on the same floor
     offsets = skeleton.p_local[-1]
-    p, _ = forward_kinematics(skeleton.R_local, skeleton.p_local[:, 0], offsets)
+    p_hips = np.array(skeleton.p_local[:, 0])
+    grown = _size(offsets) / _size(skeleton.p_local)
+    p_hips[:, 1] *= np.where(np.abs(grown - 1.0) > ROUNDING, grown, 1.0)
+    p, _ = forward_kinematics(skeleton.R_local, p_hips, offsets)
     rate = sample_rate(skeleton.times_s)
     contact = skeleton.contact
     if contact is None:
@@ -122,14 +127,14 @@ def _role_states(log: TrackerLog, times_s: Array) -> tuple[dict[str, str], ...]:
     return tuple(states)
 
 
-def _size(offsets: Array) -> float:
-    """The height of the hips by the length of the legs, which it is in proportion to."""
-    lengths = np.linalg.norm(offsets[_LEG], axis=-1)
-    return float(np.sum(lengths) / np.sum(np.linalg.norm(STANDARD_OFFSETS[_LEG], axis=-1)))
+def _size(offsets: Array) -> Array:
+    """Height of the hips (...) of bodies (..., 22, 3), by the legs: these are in proportion."""
+    legs, standard = (np.linalg.norm(o[..., _LEG, :], axis=-1) for o in (offsets, STANDARD_OFFSETS))
+    return np.asarray(legs.sum(axis=-1) / standard.sum())
 
 
 def _body(offsets: Array) -> Body:
-    size = _size(offsets)
+    size = float(_size(offsets))
     whole = np.array(offsets)
     whole[0] = (0.0, size, 0.0)
     return Body(whole[None], np.array([TOE_BASE_HEIGHT * size]), np.array([1.0 / size]))

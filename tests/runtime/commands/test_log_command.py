@@ -19,7 +19,8 @@ from lobstr_hw.drivers.fake import FakeDriver
 from lobstr_hw.drivers.tracker_log import TrackerLogWriter, read_log
 from lobstr_hw.poses import PartialPose
 from lobstr_hw.runtime.commands.log import main
-from lobstr_hw.skeleton import HUMANOID_NAMES, STANDARD_OFFSETS
+from lobstr_hw.skeleton import HUMANOID_NAMES, STANDARD_OFFSETS, Body, forward_kinematics
+from lobstr_hw.skeleton_pose import SkeletonPose
 from lobstr_hw.trackers import FOUR_POINTS, TrackerRole, TrackerSample, TrackingState
 
 CLIP_S = 3.0
@@ -218,6 +219,25 @@ class TestExport:
             found = np.array([joint[:3] for joint in frame["joints"].values()])
             np.testing.assert_allclose(found, p, atol=5e-4)
             assert set(frame["roles"]) == set(FOUR_POINTS)
+
+    def test_frames_before_the_calibration_get_the_users_body_on_the_same_floor(
+        self, tmp_path: Path
+    ) -> None:
+        log, out = tmp_path / "a.mcap", tmp_path / "a.ndjson"
+        R = np.tile(np.eye(3), (1, 22, 1, 1))
+        flags = np.ones((1, 2), bool)
+        with TrackerLogWriter(log) as writer, FakeDriver() as driver:
+            writer.add_samples(driver.poll(1.0))
+            for k, hips_m in enumerate([1.0, 1.0, 0.9, 0.9]):
+                body = Body.standard(1, hips_m)
+                p, _ = forward_kinematics(R, np.array([[0.3, hips_m, 0.2]]), body.offsets)
+                source = np.zeros((1, 22), np.int8)
+                writer.add_skeleton(SkeletonPose(k / 45, p, R, flags, flags, source, {}))
+        assert main(["export", str(log), "--ndjson", str(out)]) == 0
+        frames = [json.loads(line) for line in out.read_text(encoding="utf-8").splitlines()]
+        joints = np.array([list(frame["joints"].values()) for frame in frames])
+        np.testing.assert_allclose(joints, np.broadcast_to(joints[-1], joints.shape), atol=2e-5)
+        assert joints[0, 0, 1] == pytest.approx(0.9, abs=1e-5)
 
     def test_a_log_without_a_body_says_how_to_get_one(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
