@@ -95,7 +95,7 @@ class Gate:
             self._new_place.pop(role, None)
             return "untracked"
         p, R = sample.T_world_tracker.p, sample.T_world_tracker.R
-        fault = _malformed(p, R)
+        fault = _malformed(p, R) if math.isfinite(sample.time_s) else "nonfinite"
         if fault:
             return fault
         seen = _Seen(sample.time_s, None if p is None else p.tolist(), R)

@@ -2,7 +2,6 @@
 
 import json
 import os
-from array import array
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from lobstr_hw.skeleton import PARENTS, Body, Joint
 from lobstr_hw.skeleton_pose import SkeletonPose
 from lobstr_hw.trackers import TrackerRole
 
-__all__ = ["Summary", "Tally", "check_summary_path", "percentiles", "write_summary"]
+__all__ = ["Summary", "Tally", "check_summary_path", "write_summary"]
 
 TOES = [Joint.LEFT_TOES, Joint.RIGHT_TOES]
 
@@ -126,7 +125,7 @@ class Tally:
             rate_hz=ticks.rate_hz,
             duration_s=round(self.last_s - self.first_s, 6),
             overruns=ticks.overruns,
-            tick_ms=percentiles(ticks.work_ms),
+            tick_ms=ticks.work.summary_ms(),
             leg_delay_ms=leg_delay_ms,
             predictor=predictor,
             nonfinite_frames=nonfinite_frames,
@@ -144,14 +143,6 @@ def _norm(v: Array) -> Array:
 
 def _rounded(value: float | None) -> float | None:
     return None if value is None else round(value, 6)
-
-
-def percentiles(values_ms: "array[float]") -> dict[str, float | None]:
-    """p50, p99 and max of durations; None without any."""
-    if not values_ms:
-        return {"p50": None, "p99": None, "max": None}
-    found = np.percentile(np.array(values_ms), (50, 99, 100)).round(4).tolist()
-    return dict(zip(("p50", "p99", "max"), found, strict=True))
 
 
 def check_summary_path(path: Path) -> None:

@@ -4,12 +4,12 @@ Tick k has the nominal time ``t_k = t_0 + k / rate``; the wall clock only decide
 predictor's grid is ``g_j = t_0 - d + j / 45``; tick k runs the steps up to ``floor(45 k / rate)``.
 """
 
-from array import array
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
 from lobstr_hw.runtime.clock import Clock
+from lobstr_hw.runtime.durations import Durations
 
 __all__ = ["INPUT_DELAY_S", "Grid", "Tick", "Ticks"]
 
@@ -82,8 +82,8 @@ class Ticks:
     Attributes:
         overruns: ticks whose work was not done by the next one's deadline.
         skipped: ticks that never ran.
-        work_ms: how long each tick took.
-        late_ms: how long after its deadline each tick began (nothing when not paced).
+        work: how long ticks took.
+        lateness: how long after their deadlines they began (nothing when not paced).
     """
 
     def __init__(
@@ -117,8 +117,8 @@ class Ticks:
         self.stop = stop
         self.overruns = 0
         self.skipped = 0
-        self.work_ms = array("d")
-        self.late_ms = array("d")
+        self.work = Durations()
+        self.lateness = Durations()
 
     def __iter__(self) -> Iterator[Tick]:
         """Each tick when it is due; one pass only."""
@@ -132,7 +132,7 @@ class Ticks:
             started_s = self.clock.now_s()
             yield Tick(k, self.start_s + k / self.rate_hz, self.grid.due(k))
             done_s = self.clock.now_s()
-            self.work_ms.append(1e3 * (done_s - started_s))
+            self.work.add(1e3 * (done_s - started_s))
             k = self._next(k, done_s - began_s) if self.paced else k + 1
 
     def _over(self, k: int) -> bool:
@@ -140,7 +140,7 @@ class Ticks:
 
     def _wait(self, deadline_s: float) -> None:
         self.clock.sleep(deadline_s - self.clock.now_s())
-        self.late_ms.append(1e3 * max(0.0, self.clock.now_s() - deadline_s))
+        self.lateness.add(1e3 * max(0.0, self.clock.now_s() - deadline_s))
 
     def _next(self, k: int, elapsed_s: float) -> int:
         """The tick after k: the newest that is due already, or else k + 1."""

@@ -73,8 +73,10 @@ def test_work_and_lateness_are_recorded(clock: FakeClock) -> None:
     ticks = make(clock, 50.0, last=2)
     for _, seconds in zip(ticks, (0.005, 0.030, 0.001), strict=True):
         clock.advance(seconds)
-    assert list(ticks.work_ms) == pytest.approx([5.0, 30.0, 1.0])
-    assert list(ticks.late_ms) == pytest.approx([0.0, 0.0, 10.0], abs=1e-6)
+    assert ticks.work.count == ticks.lateness.count == 3
+    assert ticks.work.max_ms == pytest.approx(30.0)
+    assert ticks.work.percentile_ms(0.5) == pytest.approx(5.0, rel=0.01)
+    assert ticks.lateness.max_ms == pytest.approx(10.0)
     assert ticks.overruns == 1
     assert ticks.skipped == 0
 
