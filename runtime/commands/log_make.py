@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Iterator
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from lobstr_hw.drivers.tracker_log import TrackerLogWriter
 from lobstr_hw.errors import MotionFileError
 from lobstr_hw.motion import Motion
-from lobstr_hw.retargeting import Note, find_clips, retarget
+from lobstr_hw.retargeting import ClipFile, Note, find_clips, retarget
 from lobstr_hw.rotations import to_quat_xyzw
 from lobstr_hw.runtime.commands.log_report import Report, Step, Subparsers, progress_bar, whole_file
 from lobstr_hw.simulation import SimulatedTake, SimulatedUser, joined, simulate, take_samples
@@ -86,12 +87,28 @@ def clip_motion(path: Path, metres_per_unit: float | None = None) -> Motion:
         FileFormatError: no such file, not BVH, or a rig nobody knows.
         MotionFileError: the clip is known to be unusable.
     """
+    clips = find_clips([path], metres_per_unit)
+    if len(clips) > 1:
+        raise MotionFileError(f"{path} holds {len(clips)} clips. Name one of them.")
     notes: list[Note] = []
-    motions = list(retarget(find_clips([path], metres_per_unit), notes=notes.append))
+    found = retarget([clips[0], *_same_person(clips[0])], notes=notes.append)
+    motions = list(takewhile(lambda motion: motion.name.split("#")[0] == clips[0].name, found))
     if not motions:
-        why = "; ".join(note.text for note in notes) or "no good frames"
-        raise MotionFileError(f"{path}: {why}. Take another clip.")
+        why = "; ".join(note.text for note in notes if note.clip == clips[0].name)
+        raise MotionFileError(f"{path}: {why or 'no good frames'}. Take another clip.")
     return motions[0] if len(motions) == 1 else joined(motions)
+
+
+def _same_person(clip: ClipFile) -> list[ClipFile]:
+    """The other clips in the folder of the person whom the manifest names.
+
+    How the bones of a rig lie in a person is told from all that this person does: from one clip
+    alone arms come out up to 30 degrees off.
+    """
+    if clip.subject == clip.set_name:  # no manifest: these may be anybody's
+        return []
+    others = find_clips([clip.path.parent])
+    return [o for o in others if o.subject == clip.subject and o.path != clip.path]
 
 
 def write_take(path: Path, take: SimulatedTake, words: dict[str, str], step: Step) -> None:
