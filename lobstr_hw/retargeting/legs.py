@@ -3,14 +3,14 @@
 import numpy as np
 
 from lobstr_hw.retargeting.source import LEGS
-from lobstr_hw.rotations import Array, normalize, rotation_between
+from lobstr_hw.rotations import Array, angle_between, normalize, rotation_between
 from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint, forward_kinematics, local_rotations
 
 __all__ = ["solve_legs"]
 
 _THIGH = -float(STANDARD_OFFSETS[Joint.LEFT_LOWER_LEG, 1])
 _SHIN = -float(STANDARD_OFFSETS[Joint.LEFT_FOOT, 1])
-_STRAIGHT, _BENT = np.sin(np.radians([10.0, 35.0]))
+_STRAIGHT, _BENT = np.radians([10.0, 35.0])
 _REACH = 0.9995
 """Of thigh and shin: at the full length the knee's place would have an infinite slope."""
 
@@ -56,9 +56,9 @@ def _hinge(p: Array, R: Array, side: int) -> Array:
     X counts only as far as the pelvis, carried along by the thigh's swing, agrees with it.
     """
     upper, lower, foot, _ = LEGS[side]
-    thigh = p[:, lower] - p[:, upper]
-    normal = np.cross(thigh, p[:, foot] - p[:, lower])
-    sine = np.linalg.norm(normal, axis=-1, keepdims=True) / (_THIGH * _SHIN)
+    thigh, shin = p[:, lower] - p[:, upper], p[:, foot] - p[:, lower]
+    normal = np.cross(thigh, shin)
+    bend = angle_between(thigh, shin)[:, None]
     hips = R[:, Joint.HIPS]
     # swung by R from straight down, the pelvis' X is R X; a leg turns out by up to 90 degrees
     swung = (rotation_between(-hips[:, :, 1], thigh) @ hips)[:, :, 0]
@@ -69,10 +69,10 @@ def _hinge(p: Array, R: Array, side: int) -> Array:
         frames = frames + trust * x
     frames = normalize(frames)
     # a knee that bends backward is an overstretched one: only there the frames know the front
-    back = (np.sum(normal * frames, axis=-1, keepdims=True) < 0.0) & (sine < _BENT)
+    back = (np.sum(normal * frames, axis=-1, keepdims=True) < 0.0) & (bend < _BENT)
     normal = np.where(back, -normal, normal)
     # a normal is a good axis from 35 degrees on and noise under 10
-    w = np.clip((sine - _STRAIGHT) / (_BENT - _STRAIGHT), 0.0, 1.0)
+    w = np.clip((bend - _STRAIGHT) / (_BENT - _STRAIGHT), 0.0, 1.0)
     return normalize((1.0 - w) * frames + w * normalize(normal))
 
 

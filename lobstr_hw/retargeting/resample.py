@@ -10,7 +10,7 @@ __all__ = ["resample_points", "resample_rotations", "resample_times"]
 def resample_times(frames: int, rate_in_hz: float, rate_out_hz: float) -> Array:
     """Where the new frames are, counted in old frames."""
     count = int((frames - 1) / rate_in_hz * rate_out_hz + 1e-6) + 1
-    return np.minimum(np.arange(count) * (rate_in_hz / rate_out_hz), frames - 1.0)
+    return np.asarray(np.minimum(np.arange(count) * (rate_in_hz / rate_out_hz), frames - 1.0))
 
 
 def resample_points(values: Array, at: Array) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from lobstr_hw.motion import Motion
 from lobstr_hw.retargeting.canonical import CanonicalFrames, canonical_rotations, fit_frames
 from lobstr_hw.retargeting.clips import ClipFile, Fault, own_faults
-from lobstr_hw.retargeting.cuts import good_pieces
+from lobstr_hw.retargeting.cuts import bad_frames, good_pieces
 from lobstr_hw.retargeting.floor import floor_height
 from lobstr_hw.retargeting.legs import solve_legs
 from lobstr_hw.retargeting.resample import resample_points, resample_rotations, resample_times
@@ -138,16 +138,20 @@ def retarget_clip(
 ) -> list[Motion]:
     """One clip onto the standard skeleton; several Motions where it is cut."""
     R_local = local_rotations(canonical_rotations(source, frames))
-    p_toes = source.p[:, _TOES]
-    shift = 0.0 if source.standard else floor_height(p_toes, source.rate_hz)
-    pieces = good_pieces(R_local, source.rate_hz, cuts) if cuts else [(0, len(source))]
+    shift = 0.0 if source.standard else floor_height(source.p[:, _TOES], source.rate_hz)
+    p_toes = source.p[:, _TOES] - [0.0, shift, 0.0]
+    centre = source.hip_centre() - [0.0, shift, 0.0]
+    pieces = [(0, len(source))]
+    if cuts:
+        p_hips = _hips(centre, R_local[:, Joint.HIPS], frames.lift)
+        bad = bad_frames(solve_legs(R_local, p_hips, p_toes), source.rate_hz, cuts)
+        pieces = good_pieces(bad, source.rate_hz)
     out = []
     for k, (a, b) in enumerate(pieces):
         at = resample_times(b - a, source.rate_hz, RATE_HZ)
         R = resample_rotations(R_local[a:b], at)
-        centre = resample_points(source.hip_centre()[a:b], at)
-        toes = resample_points(p_toes[a:b], at) - [0.0, shift, 0.0]
-        p_hips = _hips(centre - [0.0, shift, 0.0], R[:, Joint.HIPS], frames.lift)
+        toes = resample_points(p_toes[a:b], at)
+        p_hips = _hips(resample_points(centre[a:b], at), R[:, Joint.HIPS], frames.lift)
         name = f"{clip.name}#{k}" if cuts else clip.name
         R = solve_legs(R, p_hips, toes)
         out.append(Motion(name, clip.subject, RATE_HZ, p_hips, R, toes, source.metres))
