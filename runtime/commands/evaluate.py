@@ -6,7 +6,6 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from lobstr_hw.errors import FileFormatError, LobstrError
 from lobstr_hw.evaluation.evaluate import evaluate
@@ -14,8 +13,9 @@ from lobstr_hw.evaluation.plots import plot_results
 from lobstr_hw.evaluation.rollout import Mode
 from lobstr_hw.evaluation.tables import ClipResult, document, markdown_table, total
 from lobstr_hw.evaluation.truth import Truth
-from lobstr_hw.predictors import PREDICTOR_NAMES, load_predictor
+from lobstr_hw.predictors import PREDICTOR_NAMES, Predictor, load_predictor
 from lobstr_hw.retargeting import Note, find_clips, retarget
+from lobstr_hw.runtime.stopping import StopRequest
 from lobstr_hw.splits import PARTS, Split, clip_name, default_split, read_split
 
 __all__ = ["main"]
@@ -37,13 +37,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.scale is not None and not options.scale > 0.0:
         parser.error("--scale is metres per unit of the file, over 0")
     try:
-        return _evaluate(options)
+        with StopRequest() as stop:
+            return _evaluate(options, stop)
     except LobstrError as error:
         print(f"lobstr-evaluate: {error}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
+    except _Stopped:
         print("lobstr-evaluate: stopped", file=sys.stderr)
         return 0
+
+
+class _Stopped(Exception):
+    """Ctrl-C or SIGTERM while scoring."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -73,21 +78,21 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _evaluate(options: argparse.Namespace) -> int:
+def _evaluate(options: argparse.Namespace, stop: StopRequest) -> int:
     predictor = load_predictor(options.predictor)
-    clips = _clips(options)
-    results = _score(options.predictor, predictor, clips, options.mode)
+    clips = _clips(options, stop)
+    results = _score(options.predictor, predictor, clips, options.mode, stop)
     if options.plots:
         plot_results(options.plots, results)
     if options.table:
-        table = _table(options, results, clips)
+        table = _table(options, results, clips, stop)
         print(table, file=sys.stderr if options.json else sys.stdout)
     if options.json or not options.table:
         print(json.dumps(document(results), indent=1))
     return 0
 
 
-def _clips(options: argparse.Namespace) -> list[Truth]:
+def _clips(options: argparse.Namespace, stop: StopRequest) -> list[Truth]:
     split = _split(options)
     found = find_clips(options.paths, options.scale)
     _note_missing_files(options.paths)
@@ -103,6 +108,7 @@ def _clips(options: argparse.Namespace) -> list[Truth]:
         found = [clip for clip in found if clip.set_name in sets]
     truths = []
     for motion in retarget(found, progress=_progress_retargeting, notes=_note):
+        _end_if(stop)
         if split is None or clip_name(motion.name) in wanted:
             truths.append(Truth.of(motion))
     if not truths:
@@ -128,12 +134,15 @@ def _note_missing_files(paths: Sequence[str]) -> None:
             _say(f"{manifest}: {len(missing)} rows without their file, the first {missing[0]}")
 
 
-def _score(name: str, predictor: Any, clips: list[Truth], mode: Mode) -> list[ClipResult]:
+def _score(
+    name: str, predictor: Predictor, clips: list[Truth], mode: Mode, stop: StopRequest
+) -> list[ClipResult]:
     frames = 2 * sum(len(clip) for clip in clips)
     done = 0
 
     def count(more: int) -> None:
         nonlocal done
+        _end_if(stop)
         before, done = done, done + more
         if 10 * before // frames != 10 * done // frames:
             _say(f"{name} {mode}: {100 * done // frames} %")
@@ -141,11 +150,13 @@ def _score(name: str, predictor: Any, clips: list[Truth], mode: Mode) -> list[Cl
     return evaluate(predictor, clips, mode, count)
 
 
-def _table(options: argparse.Namespace, results: list[ClipResult], clips: list[Truth]) -> str:
+def _table(
+    options: argparse.Namespace, results: list[ClipResult], clips: list[Truth], stop: StopRequest
+) -> str:
     rows = [(f"{options.predictor}, {options.mode}", results)]
     for name in TRIVIAL:
         if name != options.predictor:
-            rows.append((name, _score(name, load_predictor(name), clips, "carried")))
+            rows.append((name, _score(name, load_predictor(name), clips, "carried", stop)))
     lines = []
     for label, clip_results in rows:
         whole = total(clip_results)
@@ -154,6 +165,11 @@ def _table(options: argparse.Namespace, results: list[ClipResult], clips: list[T
     frames = total(results).network.frames
     head = f"{len(clips)} clips, {frames} frames scored ({frames / 45.0 / 60.0:.1f} minutes)"
     return f"{head}\n\n{markdown_table(lines)}"
+
+
+def _end_if(stop: StopRequest) -> None:
+    if stop():
+        raise _Stopped
 
 
 def _progress_retargeting(done: int, count: int, name: str) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lobstr_hw.errors import LobstrError, ModelError
+from lobstr_hw.runtime.stopping import StopRequest
 from lobstr_hw.training.requirements import require_training_libraries
 
 if TYPE_CHECKING:
@@ -39,10 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         require_training_libraries()
         return _export(options) if options.export else _train(options)
     except LobstrError as error:
-        print(f"lobstr-train: {error}", file=sys.stderr)
+        _say(str(error))
         return 1
     except KeyboardInterrupt:
-        print("lobstr-train: stopped; go on with --resume", file=sys.stderr)
+        _say("stopped before the first step")
         return 0
 
 
@@ -138,13 +139,17 @@ def _run(
 
     spent, began = run.wall_s, time.perf_counter()
     bar = tqdm(total=config.steps, initial=run.step, unit="step", file=sys.stderr)
-    with bar:
+    with bar, StopRequest() as stop:
         for _ in training(run, train, validation, config):
             run.wall_s = spent + time.perf_counter() - began
             bar.update()
             bar.set_postfix(_figures(run), refresh=False)
-            if run.step % config.checkpoint_every == 0 or run.step == config.steps:
+            last = run.step == config.steps
+            if run.step % config.checkpoint_every == 0 or last or stop():
                 _keep(out, run)
+            if stop() and not last:
+                _say(f"stopped after step {run.step}; go on with --resume")
+                return
 
 
 def _figures(run: "Run") -> dict[str, str]:
@@ -170,6 +175,10 @@ def _retargeting_bar(motions: Iterable[Any], total: int) -> Iterable[Any]:
         motions, total=total, unit="clip", desc="retargeting", file=sys.stderr
     )
     return bar
+
+
+def _say(text: str) -> None:
+    print(f"lobstr-train: {text}", file=sys.stderr)
 
 
 def _write_json(path: Path, document: dict[str, object]) -> None:

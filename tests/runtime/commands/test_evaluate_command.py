@@ -1,6 +1,7 @@
 """lobstr-evaluate: one JSON document on stdout, all else on stderr."""
 
 import json
+import signal
 from pathlib import Path
 
 import pytest
@@ -136,3 +137,18 @@ def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
         main(["--help"])
     assert end.value.code == 0
     assert "lobstr-evaluate DATA" in capsys.readouterr().out
+
+
+def test_it_ends_cleanly_when_asked_to(
+    data: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from lobstr_hw.runtime.commands import evaluate
+
+    def stopping(done: int, count: int, name: str) -> None:
+        signal.raise_signal(signal.SIGTERM)
+
+    monkeypatch.setattr(evaluate, "_progress_retargeting", stopping)
+    assert main([str(data)]) == 0
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "stopped" in printed.err

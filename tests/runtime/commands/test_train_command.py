@@ -1,8 +1,10 @@
 """lobstr-train: from clips to weights."""
 
 import json
+import signal
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.motions import walking
@@ -91,3 +93,27 @@ def test_help_of_train_has_an_example(capsys: pytest.CaptureFixture[str]) -> Non
         main(["--help"])
     assert end.value.code == 0
     assert "lobstr-train DATA --out" in capsys.readouterr().out
+
+
+@pytest.mark.torch
+def test_a_stopped_run_keeps_its_last_step(
+    data: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("torch", reason=CURE)
+    from lobstr_hw.training import loop
+
+    step = loop.train_step
+
+    def stopping(*arguments: Any) -> list[float]:
+        if arguments[0].step == 1:
+            signal.raise_signal(signal.SIGTERM)
+        return step(*arguments)
+
+    monkeypatch.setattr(loop, "train_step", stopping)
+    assert main(arguments(data, tmp_path / "run")) == 0
+    assert "stopped after step 2; go on with --resume" in capsys.readouterr().err
+    rows = (tmp_path / "run" / "curve.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) == 1 + 2
