@@ -20,11 +20,12 @@ from lobstr_hw.calibration import Calibration, TPose, TPoseDetector, calibrate_t
 from lobstr_hw.calibration.heading import hands_heading, turn_between
 from lobstr_hw.calibration.priors import EYES_OF_STATURE, HIPS_OF_STATURE
 from lobstr_hw.motion import Motion
+from lobstr_hw.poses import Pose
 from lobstr_hw.retargeting import find_clips, retarget
-from lobstr_hw.rotations import Array, geodesic_angle, heading_angle
+from lobstr_hw.rotations import Array, geodesic_angle, heading_angle, rotation_y
 from lobstr_hw.simulation import PoseDeviation, SimulatedTake, Sway, simulate, take_samples
 from lobstr_hw.simulation.t_pose import t_pose_motion
-from lobstr_hw.trackers import FOUR_POINTS
+from lobstr_hw.trackers import FOUR_POINTS, TrackerRole
 
 RESULTS = Path(__file__).parent.parent / "docs" / "results.md"
 TITLE = "## Calibration"
@@ -105,25 +106,28 @@ def _offsets(cases: Sequence[Case]) -> list[str]:
     ]
     for i, role in enumerate(FOUR_POINTS):
         mounts = [case.take.user.mounts[role] for case in cases]
-        R = np.stack(
-            [m.R @ c.calibration.R_tracker_joint[i] for m, c in zip(mounts, cases, strict=True)]
-        )
-        p = np.stack(
-            [
-                m.inverse().p - c.calibration.p_tracker_joint[i]
-                for m, c in zip(mounts, cases, strict=True)
-            ]
-        )
-        tilt = np.arccos(np.clip(R[:, 1, 1], -1.0, 1.0))
-        values = (
-            np.rad2deg(geodesic_angle(R, np.eye(3))),
-            np.rad2deg(tilt),
-            np.rad2deg(np.abs(heading_angle(R)[0])),
-            100.0 * np.linalg.norm(p, axis=-1),
-        )
-        name = role.replace("_", " ")
-        rows.append("| ".join(["", name + " ", *(_two(v) + " " for v in values)]) + "|")
+        found = [case.calibration.R_tracker_joint[i] for case in cases]
+        p = [
+            m.inverse().p - c.calibration.p_tracker_joint[i]
+            for m, c in zip(mounts, cases, strict=True)
+        ]
+        if role is TrackerRole.HEAD:  # the paper's way, without the headset's prior
+            straight = [c.pose.R[0].T @ rotation_y(c.calibration.heading_rad) for c in cases]
+            rows.append(_row("head, taken as held straight", mounts, straight, p))
+        rows.append(_row(role.replace("_", " "), mounts, found, p))
     return rows
+
+
+def _row(name: str, mounts: Sequence[Pose], found: Sequence[Array], off_m: Sequence[Array]) -> str:
+    R = np.stack([mount.R for mount in mounts]) @ np.stack(found)
+    tilt = np.arccos(np.clip(R[:, 1, 1], -1.0, 1.0))
+    values = (
+        np.rad2deg(geodesic_angle(R, np.eye(3))),
+        np.rad2deg(tilt),
+        np.rad2deg(np.abs(heading_angle(R)[0])),
+        100.0 * np.linalg.norm(off_m, axis=-1),
+    )
+    return "| ".join(["", name + " ", *(_two(v) + " " for v in values)]) + "|"
 
 
 def _measures(cases: Sequence[Case]) -> list[str]:
@@ -135,17 +139,17 @@ def _measures(cases: Sequence[Case]) -> list[str]:
     true_stature = np.array([case.take.user.stature_m for case in cases])
     stature = np.array([case.calibration.stature_m for case in cases])
     eyes_only = np.array([HIPS_OF_STATURE * c.pose.p[0, 1] / EYES_OF_STATURE for c in cases])
+    told = [calibrate_t_pose(c.pose, stature_m=c.take.user.stature_m) for c in cases]
+    told_hips = np.array([1.0 / calibration.scale for calibration in told])
     yaw = np.array([heading_angle(c.take.user.T_tracking_play.R)[0] for c in cases])
     found_yaw = np.array([case.calibration.heading_rad for case in cases])
     hands_yaw = np.array([hands_heading(c.pose.p[1], c.pose.p[2]) for c in cases])
     rows = (
         ("heading, degrees", _degrees(found_yaw, yaw)),
         ("heading from the hands alone, degrees", _degrees(hands_yaw, yaw)),
-        (
-            "height scale, % (hips' height, and so every length of the legs)",
-            _percent(found_hips, true_hips),
-        ),
+        ("height scale and leg length, %", _percent(found_hips, true_hips)),
         ("the same from the headset alone, %", _percent(eyes_only, true_hips)),
+        ("the same where the stature is told, %", _percent(told_hips, true_hips)),
         ("arm length, %", _percent(found_arm, true_arm)),
         ("stature, %", _percent(stature, true_stature)),
     )

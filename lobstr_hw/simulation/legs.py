@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from lobstr_hw.ik import solve_two_bone
 from lobstr_hw.rotations import Array, normalize
 from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint
 
@@ -46,17 +47,8 @@ def rotations_to_ankles(
         forward: (..., 2, 3) where the knees point.
     """
     socket = p_hips[..., None, :] + _turned(R_hips)
-    reach = p_ankles - socket
-    distance = np.linalg.norm(reach, axis=-1, keepdims=True)
-    along = normalize(reach)
-    d = np.clip(distance, abs(_THIGH - _SHIN) + 1e-9, _THIGH + _SHIN)
-    # law of cosines: how far along the line, and how far in front of it, the knee stands
-    a = (d**2 + _THIGH**2 - _SHIN**2) / (2.0 * d)
-    out = np.sqrt(np.maximum(_THIGH**2 - a**2, 0.0))
-    pole = normalize(forward - np.sum(forward * along, axis=-1, keepdims=True) * along)
-    knee = a * along + out * pole
-    ankle = d * along
-    return _bone(-knee, forward), _bone(knee - ankle, forward)
+    knee = solve_two_bone(socket, p_ankles, _THIGH, _SHIN, forward)
+    return _bone(socket - knee, forward), _bone(knee - p_ankles, forward)
 
 
 def _turned(R_hips: Array) -> Array:
