@@ -1,8 +1,8 @@
 """Topics and JSON schemas of a tracker log.
 
-``foxglove.*`` are the published schema names and fields of Foxglove, so that its viewer and Rerun
-draw trackers and skeleton as they are; keys that they do not know are ignored there. ``lobstr.*``
-are this project's own.
+``foxglove.*`` are the published schema names and fields of Foxglove, whose 3D panel knows what to
+draw by them and ignores keys that it does not know. Rerun (0.41) opens the file and lists these
+messages, but draws only protobuf. ``lobstr.*`` are this project's own.
 """
 
 import json

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-from lobstr_hw.drivers.tracker_log import TrackerLogWriter, read_log
+from lobstr_hw.drivers.tracker_log import TrackerLogWriter, container, read_log
 from lobstr_hw.drivers.tracker_log.messages import nanoseconds, seconds
 from lobstr_hw.errors import LogFileError
 from lobstr_hw.poses import PartialPose
@@ -233,6 +233,23 @@ def test_a_clean_close_compresses_and_leaves_nothing_beside_the_file(tmp_path: P
     writer.close()
     assert (tmp_path / "a.mcap").stat().st_size < 0.6 * before
     assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
+
+
+def test_a_disk_that_fills_while_compressing_leaves_the_whole_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*args: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    writer = TrackerLogWriter(tmp_path / "a.mcap")
+    writer.add_samples(random_samples(4))
+    monkeypatch.setattr(container, "replace_file", full)
+    with pytest.raises(OSError, match="No space left"):
+        writer.close()
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
+    log = read_log(tmp_path / "a.mcap")
+    assert not log.cut
+    assert sum(map(len, log.trackers)) == len(random_samples(4))
 
 
 def test_a_missing_file_says_what_to_do(tmp_path: Path) -> None:
