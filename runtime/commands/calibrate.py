@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lobstr_hw.errors import DriverUnavailable, LobstrError
+from lobstr_hw.errors import DriverUnavailable, LobstrError, ProfileError
 from lobstr_hw.runtime.profile_path import default_profile_path
 from lobstr_hw.runtime.stopping import StopRequest
 
@@ -40,6 +40,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
     except KeyboardInterrupt:
         _tell("stopped; nothing was written.")
+        if args.json:
+            print(json.dumps({"stopped": True}))
         return 0
 
 
@@ -81,14 +83,12 @@ def _run(args: argparse.Namespace, stop: Callable[[], bool]) -> int:
         )
     path = args.profile or default_profile_path()
     if path.exists() and not args.yes and not _may_replace(path):
-        _tell(
-            f"{path} is left as it was. --yes replaces it, --profile FILE puts the new elsewhere."
+        raise ProfileError(
+            f"{path} is left as it was. --yes replaces it; or give another --profile FILE."
         )
-        return 1
     pose = _t_pose(args.sim, stop)
     if pose is None:
-        _tell("stopped; nothing was written.")
-        return 0
+        raise KeyboardInterrupt
     calibration = _calibrated(pose, args.height)
     from lobstr_hw.calibration import save_profile
 
@@ -119,6 +119,8 @@ def _t_pose(log: Path, stop: Callable[[], bool]) -> "TPose | None":
     from lobstr_hw.drivers.replay import ReplayDriver
 
     with ReplayDriver(log) as driver:
+        if driver.log.damage:
+            _tell(f"{log}: {driver.log.damage}; looking at the {driver.duration_s:.1f} s before.")
         hints = {device.serial: device.role_hint for device in driver.devices()}
         detector = TPoseDetector({serial: role for serial, role in hints.items() if role})
         step = 0

@@ -86,6 +86,39 @@ def test_a_person_is_asked_before_an_old_profile_is_replaced(
     assert (path.read_text(encoding="utf-8") == "old") == bool(code)
 
 
+def test_json_stays_one_document_when_nothing_is_written(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "me.json"
+    path.write_text("old", encoding="utf-8")
+    assert main(["--sim", str(log), "--json", "--profile", str(path)]) == 1
+    assert "left as it was" in json.loads(capsys.readouterr().out)["error"]
+
+
+def test_being_stopped_leaves_the_old_profile_and_says_so(
+    log: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = tmp_path / "me.json"
+    monkeypatch.setattr("lobstr_hw.runtime.stopping.StopRequest.__call__", lambda self: True)
+    assert main(["--sim", str(log), "--yes", "--json", "--profile", str(path)]) == 0
+    assert json.loads(capsys.readouterr().out) == {"stopped": True}
+    assert not path.exists()
+
+
+def test_a_cut_log_is_used_as_far_as_it_goes(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cut = tmp_path / "cut.mcap"
+    whole = log.read_bytes()
+    cut.write_bytes(whole[: int(0.8 * len(whole))])
+    path = tmp_path / "me.json"
+    assert main(["--sim", str(cut), "--yes", "--profile", str(path)]) == 0
+    assert "cut.mcap" in capsys.readouterr().err
+
+
 def test_without_a_profile_option_it_goes_to_the_configuration_folder(
     log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
