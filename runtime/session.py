@@ -21,6 +21,10 @@ Watcher = Callable[[Sequence[TrackerSample]], Calibration | None]
 """Shown the samples of every tick until it finds a calibration in them."""
 
 
+RESTART_AFTER_S = 0.2
+"""A state that has given nothing finite for so long is given up."""
+
+
 class Session:
     """Calibration, avatar and its state.
 
@@ -52,6 +56,7 @@ class Session:
         self._rate_hz, self._input_delay_s = rate_hz, input_delay_s
         self.body = Body.standard()
         self.nonfinite_frames = 0
+        self._bad_in_a_row = 0
         self._watch = watch
         self.calibration: Calibration | None = None
         self._good: SkeletonPose | None = None
@@ -111,9 +116,12 @@ class Session:
     def _finite(self, state: State, pose: SkeletonPose) -> SkeletonPose:
         """A pose that may go out; one that is not finite leaves no trace in the state either."""
         if np.isfinite(pose.p_world).all() and np.isfinite(pose.R_local).all():
-            self._state, self._good = state, pose
+            self._state, self._good, self._bad_in_a_row = state, pose, 0
             return pose
         self.nonfinite_frames += 1
+        self._bad_in_a_row += 1
+        if self._bad_in_a_row >= RESTART_AFTER_S * self._rate_hz:
+            self._state, self._bad_in_a_row = self._avatar.start(), 0
         if self._good is None:
             return standing_pose(pose.time_s, None, self.body, pose.roles)
         return replace(self._good, time_s=pose.time_s, roles=pose.roles)
