@@ -208,7 +208,7 @@ def _checks(p: Array, R: Array, spread_m: float, spread_rad: float) -> tuple[Che
     shoulders = "bring both hands to the height of your shoulders"
     upright = "stand upright, the pelvis tracker on your belt"
     return (
-        Check("still", 100.0 * spread_m, 0.0, 3.0, "cm", "stand still"),
+        Check("still", 100.0 * spread_m, 0.0, 4.0, "cm", "stand still"),
         Check(
             "steady", float(np.rad2deg(spread_rad)), 0.0, 6.0, "degrees", "hold your hands still"
         ),

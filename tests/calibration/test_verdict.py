@@ -19,7 +19,7 @@ def test_nothing_to_complain_about_is_good() -> None:
 @pytest.mark.parametrize(
     "odd",
     [
-        Residuals(spread_m=0.029),
+        Residuals(spread_m=0.039),
         Residuals(spread_rad=0.09),
         Residuals(heading_disagreement_rad=-0.5),
         Residuals(misfit=3.0),
