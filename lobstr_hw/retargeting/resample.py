@@ -9,7 +9,8 @@ __all__ = ["resample_points", "resample_rotations", "resample_times"]
 
 def resample_times(frames: int, rate_in_hz: float, rate_out_hz: float) -> Array:
     """Where the new frames are, counted in old frames."""
-    count = int((frames - 1) / rate_in_hz * rate_out_hz + 1e-6) + 1
+    # a file's frame time is rounded, so the last new frame may be said to fall just after its end
+    count = int((frames - 1) / rate_in_hz * rate_out_hz + 1e-2) + 1
     return np.asarray(np.minimum(np.arange(count) * (rate_in_hz / rate_out_hz), frames - 1.0))
 
 
