@@ -20,6 +20,9 @@ FOOT_WEIGHT = 0.5
 FULL_REACH = 0.995
 """Of the stretched leg's length; beyond it the levers are all but parallel."""
 
+STRAIGHT = 0.998
+"""Of the leg's length to the ankle: no leg is stretched further than this by IK alone."""
+
 STEP_LIMIT = 0.5
 """Radians per iteration: the Jacobian is a good guide no further."""
 
@@ -88,6 +91,10 @@ def _in_reach(target: Array, p_hip: Array, bones: LegBones) -> Array:
 def _with_foot_held(pose: LegPose, p_hip: Array, bones: LegBones, target: Array) -> LegPose:
     to_ankle = target - rotate(pose.foot, bones.foot) - p_hip
     upper, lower = rotate(pose.upper, bones.upper), rotate(pose.lower, bones.lower)
+    # near full stretch the knee's bend goes with the square root of what is missing and trembles:
+    # the last bit is left to the foot, unless the pose itself is straighter
+    most = np.maximum(STRAIGHT * (length(upper) + length(lower)), length(upper + lower))
+    to_ankle = to_ankle * np.minimum(most / np.maximum(length(to_ankle), 1e-9), 1.0)
     R_bend, R_swing, _ = bend_and_swing(upper, lower, pose.upper[..., :, 0], to_ankle)
     return LegPose(R_swing @ pose.upper, R_swing @ (R_bend @ pose.lower), pose.foot)
 

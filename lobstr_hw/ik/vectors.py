@@ -46,12 +46,12 @@ def cross(a: Array, b: Array) -> Array:
 
 def dot(a: Array, b: Array) -> Array:
     """Scalar product a . b with the last axis kept: (..., 1)."""
-    return np.asarray((a * b).sum(-1, keepdims=True))
+    return np.asarray(np.add.reduce(a * b, axis=-1, keepdims=True))
 
 
 def length(v: Array) -> Array:
     """Of vectors (..., 3), the last axis kept: (..., 1)."""
-    return np.asarray(np.sqrt((v * v).sum(-1, keepdims=True)))
+    return np.asarray(np.sqrt(np.add.reduce(v * v, axis=-1, keepdims=True)))
 
 
 def unit(v: Array) -> Array:
@@ -81,12 +81,11 @@ def _cross_matrix(v: Array) -> Array:
 
 def turn(w: Array) -> Array:
     """Rotation vectors (..., 3) -> matrices (..., 3, 3), exact also for very small turns."""
-    square = (w * w).sum(-1)[..., None, None]
-    angle = np.sqrt(square)
+    angle = np.maximum(length(w), 1e-30)[..., None]
     K = _cross_matrix(w)
     # Rodrigues with sin(a)/a and (1 - cos(a))/a^2 = (sin(a/2)/(a/2))^2 / 2
-    a = np.sinc(angle / np.pi)
-    b = np.sinc(angle / (2.0 * np.pi))
+    half = 0.5 * angle
+    a, b = np.sin(angle) / angle, np.sin(half) / half
     return np.asarray(_EYE + a * K + (0.5 * b * b) * (K @ K))
 
 
