@@ -17,6 +17,10 @@ class Clock(Protocol):
         """Wait at least this long; nothing for zero or less."""
         ...
 
+    def unix_s(self) -> float:
+        """UNIX time now, for logs only: it may step."""
+        ...
+
 
 class HostClock:
     """The machine's clock, counted from when this object was made.
@@ -37,3 +41,7 @@ class HostClock:
         """Wait; the operating system may oversleep by a millisecond or so."""
         if seconds > 0.0:
             time.sleep(seconds)
+
+    def unix_s(self) -> float:
+        """UNIX time now."""
+        return time.time()

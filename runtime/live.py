@@ -16,7 +16,7 @@ from lobstr_hw.runtime.feed import Feed
 from lobstr_hw.runtime.loop import run
 from lobstr_hw.runtime.outputs.output import Output
 from lobstr_hw.runtime.outputs.queued import QueuedOutput
-from lobstr_hw.runtime.outputs.sinks import SinkSpec, make_output
+from lobstr_hw.runtime.outputs.sinks import SessionFacts, SinkSpec, make_output
 from lobstr_hw.runtime.profiles import chosen_profile
 from lobstr_hw.runtime.roles import RoleTable
 from lobstr_hw.runtime.session import Session
@@ -155,15 +155,23 @@ class LiveSession:
         return None if end_s is None else int(end_s * self.options.rate_hz + 1e-6)
 
     def _open_outputs(self, table: RoleTable) -> None:
+        facts = SessionFacts(table.of, self._unix_offset_s, self.tell)
         for spec in self.options.outputs:
             self._spare_the_log(spec)
-            output = make_output(spec, table.of, self.tell)
+            output = make_output(spec, facts)
             output.open(self.session.body, self.options.rate_hz, self.options.take)
             self._open.callback(output.close)
             self.outputs.append(output)
             self._queues.append(output)
             if self.session.calibrated:
                 output.calibrated(self.session.body)
+
+    def _unix_offset_s(self, now_s: float) -> float | None:
+        """What to add to session times; a replay hands on what its log says, if anything."""
+        if not isinstance(self.driver, ReplayDriver):
+            return self.clock.unix_s() - now_s
+        log = self.driver.log
+        return None if log.unix_offset_s is None else log.unix_offset_s + log.start_s
 
     def _spare_the_log(self, spec: SinkSpec) -> None:
         if isinstance(self.driver, ReplayDriver) and spec.rest != "-":

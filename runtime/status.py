@@ -16,7 +16,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from lobstr_hw.skeleton_pose import SkeletonPose
+from lobstr_hw.skeleton_pose import SkeletonPose, Source
 
 __all__ = ["Snapshot", "StatusLine", "render"]
 
@@ -77,6 +77,8 @@ def _rate(now: Snapshot, before: Snapshot | None) -> Text:
 
 
 def _calibration(now: Snapshot) -> Text:
+    if now.calibrated and (now.pose.source == Source.HELD).all():
+        return Text("waiting for trackers", "yellow")
     if now.calibrated:
         return Text("calibrated", "green")
     return Text("waiting for a T-pose", "yellow")

@@ -15,14 +15,23 @@ __all__ = ["McapOutput"]
 class McapOutput:
     """Samples as the drivers gave them, before any maths, and the skeleton of every tick."""
 
-    def __init__(self, path: Path, role_of: Callable[[str], TrackerRole | None]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        role_of: Callable[[str], TrackerRole | None],
+        unix_offset_s: Callable[[float], float | None] = lambda time_s: None,
+    ) -> None:
         """Choose the file.
 
         Args:
             path: to write.
             role_of: the role of a serial at this moment, if it has one.
+            unix_offset_s: given the session time of now, what to add to session times for UNIX
+                time; None where nobody knows, as in a made log.
         """
         self.path = path
+        self._unix_offset_s = unix_offset_s
+        self._begun = False
         self._role_of = role_of
         self._writer: TrackerLogWriter | None = None
         self._roles: dict[str, TrackerRole] = {}
@@ -41,6 +50,9 @@ class McapOutput:
     def send(self, pose: SkeletonPose, samples: Sequence[TrackerSample]) -> None:
         """The samples of a tick, a role where it is new, then the skeleton."""
         assert self._writer is not None
+        if not self._begun:
+            self._begun = True
+            self._mark_clock(self._writer, pose.time_s)
         for sample in samples:
             self._note_role(self._writer, sample)
         self._writer.add_samples(samples)
@@ -51,6 +63,11 @@ class McapOutput:
         if self._writer is not None:
             self._writer.close()
             self._writer = None
+
+    def _mark_clock(self, writer: TrackerLogWriter, now_s: float) -> None:
+        offset_s = self._unix_offset_s(now_s)
+        if offset_s is not None:
+            writer.mark_clock(offset_s)
 
     def _note_role(self, writer: TrackerLogWriter, sample: TrackerSample) -> None:
         role = self._role_of(sample.serial)

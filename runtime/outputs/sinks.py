@@ -13,10 +13,23 @@ from lobstr_hw.runtime.outputs.output import Output
 from lobstr_hw.runtime.outputs.queued import QueuedOutput
 from lobstr_hw.trackers import TrackerRole
 
-__all__ = ["SINKS", "RoleOf", "SinkSpec", "make_output", "parse_sink"]
+__all__ = ["SINKS", "SessionFacts", "SinkSpec", "make_output", "parse_sink"]
 
-RoleOf = Callable[[str], TrackerRole | None]
-"""The role of a serial at this moment, if it has one."""
+
+@dataclass(frozen=True, slots=True)
+class SessionFacts:
+    """What an output may ask about the session it belongs to.
+
+    Attributes:
+        role_of: the role of a serial at this moment, if it has one.
+        unix_offset_s: given the session time of now, what to add to session times for UNIX time;
+            None where nobody knows.
+        tell: takes a message for the user.
+    """
+
+    role_of: Callable[[str], TrackerRole | None]
+    unix_offset_s: Callable[[float], float | None]
+    tell: Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,22 +46,22 @@ class SinkSpec:
 
 
 class _Maker(Protocol):
-    def __call__(self, spec: SinkSpec, role_of: RoleOf) -> Output: ...
+    def __call__(self, spec: SinkSpec, facts: SessionFacts) -> Output: ...
 
 
-def _bvh(spec: SinkSpec, role_of: RoleOf) -> Output:
+def _bvh(spec: SinkSpec, facts: SessionFacts) -> Output:
     from lobstr_hw.runtime.outputs.bvh import BvhOutput
 
     return BvhOutput(Path(spec.rest))
 
 
-def _mcap(spec: SinkSpec, role_of: RoleOf) -> Output:
+def _mcap(spec: SinkSpec, facts: SessionFacts) -> Output:
     from lobstr_hw.runtime.outputs.mcap import McapOutput
 
-    return McapOutput(Path(spec.rest), role_of)
+    return McapOutput(Path(spec.rest), facts.role_of, facts.unix_offset_s)
 
 
-def _ndjson(spec: SinkSpec, role_of: RoleOf) -> Output:
+def _ndjson(spec: SinkSpec, facts: SessionFacts) -> Output:
     from lobstr_hw.runtime.outputs.ndjson import NdjsonOutput
 
     return NdjsonOutput(spec.rest)
@@ -89,12 +102,11 @@ def _split_options(rest: str) -> tuple[str, dict[str, str]]:
     return before, {key: value for key, _, value in pairs}
 
 
-def make_output(spec: SinkSpec, role_of: RoleOf, tell: Callable[[str], None]) -> QueuedOutput:
+def make_output(spec: SinkSpec, facts: SessionFacts) -> QueuedOutput:
     """The output of a sink, behind its queue; nothing is opened yet.
 
     Args:
         spec: from :func:`parse_sink`.
-        role_of: the role of a serial at this moment.
-        tell: is told once when the output dies.
+        facts: about the session; ``tell`` is told once when the output dies.
     """
-    return QueuedOutput(str(spec), SINKS[spec.name](spec, role_of), tell)
+    return QueuedOutput(str(spec), SINKS[spec.name](spec, facts), facts.tell)

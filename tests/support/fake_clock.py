@@ -15,6 +15,9 @@ class FakeClock:
         self.slept_s.append(seconds)
         self.time_s += max(seconds, 0.0)
 
+    def unix_s(self) -> float:
+        return 1.7e9 + self.time_s
+
     def advance(self, seconds: float) -> None:
         """Work that takes this long."""
         self.time_s += seconds

@@ -63,3 +63,19 @@ def test_the_same_calls_give_the_same_bytes(tmp_path: Path) -> None:
 def test_a_missing_folder_is_told_before_anything_starts(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="make this one first"):
         McapOutput(tmp_path / "no" / "out.mcap", ROLES.get).open(BODY, 45.0, "take")
+
+
+@pytest.mark.parametrize("offset_s", [1.7e9, None])
+def test_the_offset_to_unix_time_is_kept_where_it_is_known(
+    tmp_path: Path, offset_s: float | None
+) -> None:
+    def offset(now_s: float) -> float | None:
+        assert now_s == 3.0
+        return offset_s
+
+    output = McapOutput(tmp_path / "out.mcap", ROLES.get, offset)
+    output.open(BODY, 45.0, "take")
+    for pose in random_poses(1, 2, BODY):
+        output.send(pose, samples(pose.time_s))
+    output.close()
+    assert read_log(tmp_path / "out.mcap").unix_offset_s == offset_s
