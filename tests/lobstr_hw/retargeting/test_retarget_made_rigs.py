@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.gaits import planted_walk, write_rig
 
 from lobstr_hw.bvh import write_bvh
 from lobstr_hw.motion import Motion
@@ -11,7 +12,6 @@ from lobstr_hw.retargeting import Fault, Note, find_clips, retarget
 from lobstr_hw.retargeting.agreement import measure
 from lobstr_hw.rotations import geodesic_angle, heading, rotation_x
 from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint
-from tests.support.gaits import planted_walk, write_rig
 
 LEGS = [j for j in Joint if j >= Joint.LEFT_UPPER_LEG]
 WALK = planted_walk()
@@ -60,7 +60,8 @@ def test_a_clip_of_120_frames_a_second_gives_the_same_45(tmp_path: Path) -> None
     slow, fast = back(tmp_path / "slow"), back(tmp_path / "fast")
     assert slow.rate_hz == fast.rate_hz == 45.0
     assert len(slow) == len(fast)
-    assert np.abs(slow.joints()[0] - fast.joints()[0]).max() < 0.01
+    off = np.linalg.norm(slow.joints()[0] - fast.joints()[0], axis=-1)
+    assert np.percentile(off, 99) < 0.002
 
 
 def test_a_floor_that_is_high_and_slopes_by_a_degree_is_levelled(tmp_path: Path) -> None:
