@@ -8,9 +8,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Long runs are asked for by name; devices by --hardware."""
-    soak = "soak" in (config.getoption("-m") or "")
+    """Long runs and test beds are asked for by name; devices by --hardware."""
+    asked = config.getoption("-m") or ""
+    soak, bed = "soak" in asked, "bed" in asked
     for item in items:
+        if "bed" in item.keywords and not bed:
+            item.add_marker(pytest.mark.skip(reason="needs a test bed: pytest -m bed"))
         if "soak" in item.keywords and not soak:
             item.add_marker(pytest.mark.skip(reason="takes long: pytest -m soak"))
         if "hardware" in item.keywords and not config.getoption("--hardware"):
