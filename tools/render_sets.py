@@ -14,6 +14,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from PIL import Image
 
 from lobstr_hw.bvh import read_bvh
 from lobstr_hw.motion import Motion
@@ -22,6 +23,7 @@ from lobstr_hw.retargeting.agreement import walking_frames
 from lobstr_hw.rotations import Array, heading
 from lobstr_hw.skeleton import EYES, HEEL, PARENTS, TOE_TIP, Joint
 
+FRAMES, STEP_M = (7, 5), (0.95, 0.85)
 LEFT, RIGHT, MIDDLE = "tab:blue", "tab:red", "0.3"
 
 
@@ -50,43 +52,47 @@ def draw(clip: ClipFile, motion: Motion, path: Path) -> None:
     bvh = read_bvh(clip.path)
     p_rig, _ = bvh.world()
     p, R = motion.joints()
-    frames = _key_frames(motion)
     scale = float(clip.metres_per_unit or 1.0) / motion.metres
-    figure, axes = plt.subplots(2, 2, figsize=(11, 6.2), sharey=True, width_ratios=(3, 2))
-    for row, title in enumerate((f"{clip.name}: the rig", "standard skeleton")):
-        for column, view in enumerate(("from the right", "from the front")):
+    toes = [n for n, name in enumerate(bvh.names) if "toe" in name.lower()][:2]
+    widths = [STEP_M[c] * FRAMES[c] for c in (0, 1)]
+    figure, axes = plt.subplots(2, 2, figsize=(11, 5.6), sharey=True, width_ratios=widths)
+    for column, view in enumerate(("from the right", "from the front")):
+        for row, title in enumerate((f"{clip.name}: the rig", "standard skeleton")):
             ax = axes[row][column]
-            ax.axhline(0.0, color="0.7", lw=1)
+            ax.axhline(0.0, color="0.6", lw=0.8)
             ax.set_aspect("equal")
+            ax.set_xlim(-0.5 * STEP_M[column], widths[column] - 0.5 * STEP_M[column])
+            ax.set_ylim(-0.08, 1.85)
+            ax.set_xticks([])
             ax.set_title(f"{title}, {view}", fontsize=8)
             ax.tick_params(labelsize=6)
-            for k, i in enumerate(frames):
-                turn = heading(R[i, Joint.HIPS]).T
-                at = np.array([(0.8 if column else 0.9) * k, 0.0, 0.0])
-                if row == 0:
-                    j = min(round(i / motion.rate_hz / bvh.frame_time_s), len(bvh) - 1)
-                    q, lines = p_rig[j] * scale, _rig_lines(bvh.names, bvh.parents)
-                    # the rig's own floor and place: shown as retargeting moved it
-                    toes = [n for n, name in enumerate(bvh.names) if "toe" in name.lower()]
-                    q = q - [0.0, q[toes[:2], 1].mean() - motion.p_toes[i, :, 1].mean(), 0.0]
-                    centre = q[_root(bvh.names)]
-                else:
-                    q, lines = _skeleton(p[i], R[i])
-                    centre = q[0]
-                q = (q - centre * [1, 0, 1]) @ turn.T
-                _stick(ax, q, lines, column, at)
-    figure.tight_layout()
-    figure.savefig(path, dpi=60, pil_kwargs={"optimize": True})
+        for k, i in enumerate(_key_frames(motion, FRAMES[column])):
+            turn = heading(R[i, Joint.HIPS]).T
+            at = STEP_M[column] * k
+            j = min(round(i / motion.rate_hz / bvh.frame_time_s), len(bvh) - 1)
+            rig = p_rig[j] * scale
+            # the rig's own floor is elsewhere: stand it where retargeting put its toes
+            rig = rig - [0.0, rig[toes, 1].mean() - motion.p_toes[i, :, 1].mean(), 0.0]
+            own, lines = _skeleton(p[i], R[i])
+            middle = rig[_root(bvh.names)]
+            for row, (q, centre, bones) in enumerate(
+                ((rig, middle, _rig_lines(bvh.names, bvh.parents)), (own, own[0], lines))
+            ):
+                _stick(axes[row][column], (q - centre * [1, 0, 1]) @ turn.T, bones, column, at)
+    figure.tight_layout(pad=0.4)
+    figure.savefig(path, dpi=80)
     plt.close(figure)
+    # 16 colours are enough for lines and keep the repository small
+    Image.open(path).convert("RGB").quantize(16).save(path, optimize=True)
 
 
-def _key_frames(motion: Motion) -> list[int]:
-    """Eight frames over a second and a half of walking, or over the clip."""
+def _key_frames(motion: Motion, count: int) -> list[int]:
+    """Frames over a stride of walking, or over the clip where nobody walks."""
     walk = np.flatnonzero(walking_frames(motion))
     if len(walk) < 45:
-        return [int(i) for i in np.linspace(0, len(motion) - 1, 8)]
+        return [int(i) for i in np.linspace(0, len(motion) - 1, count)]
     start = walk[len(walk) // 3]
-    return [int(i) for i in np.linspace(start, min(start + 60, len(motion) - 1), 8)]
+    return [int(i) for i in np.linspace(start, min(start + 54, len(motion) - 1), count)]
 
 
 def _root(names: Sequence[str]) -> int:
@@ -112,7 +118,7 @@ def _colour(name: str) -> str:
 def _skeleton(p: Array, R: Array) -> tuple[Array, list[tuple[int, int, str]]]:
     """The 22 joints, with eyes, heels, toe tips and fingers."""
     lines = [(p_, j, _colour(Joint(j).name)) for j, p_ in enumerate(PARENTS) if p_ >= 0]
-    extra = []
+    extra: list[Array] = []
     for joint, offset in (
         (Joint.HEAD, EYES),
         (Joint.LEFT_FOOT, HEEL),
@@ -129,12 +135,12 @@ def _skeleton(p: Array, R: Array) -> tuple[Array, list[tuple[int, int, str]]]:
     return np.concatenate([p, extra]), lines
 
 
-def _stick(ax: Axes, q: Array, lines: list[tuple[int, int, str]], column: int, at: Array) -> None:
+def _stick(ax: Axes, q: Array, lines: list[tuple[int, int, str]], column: int, at: float) -> None:
     """Seen from the right (Z to the right) or from the front (the left hand on the right)."""
     across = 0 if column else 2
     for a, b, colour in lines:
         ax.plot(
-            [q[a, across] + at[0], q[b, across] + at[0]],
+            [q[a, across] + at, q[b, across] + at],
             [q[a, 1], q[b, 1]],
             color=colour,
             lw=1.2,

@@ -102,7 +102,7 @@ def test_channels_may_come_in_any_order(tmp_path: Path) -> None:
     bvh = odd(tmp_path)
     turns = Rotation.from_euler("YZX", [[10, 20, 30], [-10, -20, -30]], degrees=True)
     assert np.allclose(bvh.R_local[:, 0], turns.as_matrix())
-    assert np.allclose(bvh.p_local[:, 0], [[1, 91, 3], [1.5, 92, 3.5]])
+    assert np.allclose(bvh.p_local[:, 0], np.array([[1.0, 91.0, 3.0], [1.5, 92.0, 3.5]]))
 
 
 def test_a_joint_may_move_and_a_channel_replaces_only_its_own_coordinate(tmp_path: Path) -> None:
