@@ -3,7 +3,7 @@
 import numpy as np
 
 from lobstr_hw.ik import solve_two_bone
-from lobstr_hw.rotations import Array, normalize
+from lobstr_hw.rotations import Array, rotation_between
 from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint
 
 __all__ = ["LEGS", "plant", "rotations_to_ankles"]
@@ -35,28 +35,23 @@ def plant(p_hips: Array, R_hips: Array, p_ankles: Array, bend_m: Array | float =
     return np.asarray(p_hips - drop[..., None] * np.array([0.0, 1.0, 0.0]))
 
 
-def rotations_to_ankles(
-    p_hips: Array, R_hips: Array, p_ankles: Array, forward: Array
-) -> tuple[Array, Array]:
-    """World rotations (..., 2, 3, 3) of upper and lower legs that bring the ankles to a place.
+def rotations_to_ankles(p_hips: Array, R_hips: Array, p_ankles: Array, like: Array) -> Array:
+    """World rotations (..., 2, 2, 3, 3) of upper and lower legs that bring the ankles to a place.
 
     Args:
         p_hips: (..., 3) metres.
         R_hips: (..., 3, 3).
         p_ankles: (..., 2, 3); one out of reach is pointed at.
-        forward: (..., 2, 3) where the knees point.
+        like: (..., 2, 2, 3, 3) legs that these should resemble; knees bend as theirs do.
     """
     socket = p_hips[..., None, :] + _turned(R_hips)
-    knee = solve_two_bone(socket, p_ankles, _THIGH, _SHIN, forward)
-    return _bone(socket - knee, forward), _bone(knee - p_ankles, forward)
+    # the knee is a hinge about X: it stands off the line to the ankle at right angles to both
+    pole = np.cross(p_ankles - socket, like[..., 0, :, 0])
+    knee = solve_two_bone(socket, p_ankles, _THIGH, _SHIN, pole)
+    up = np.stack([socket - knee, knee - p_ankles], axis=-2)
+    # the smallest turn, so that a leg keeps its twist
+    return np.asarray(rotation_between(like[..., :, 1], up) @ like)
 
 
 def _turned(R_hips: Array) -> Array:
     return np.asarray((R_hips[..., None, :, :] @ _SOCKETS[..., None])[..., 0])
-
-
-def _bone(up: Array, forward: Array) -> Array:
-    """The frame whose Y is the bone's upward direction and whose Z is nearest to forward."""
-    y = normalize(up)
-    x = normalize(np.cross(y, forward))
-    return np.stack([x, y, np.cross(x, y)], axis=-1)

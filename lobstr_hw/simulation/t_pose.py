@@ -100,9 +100,8 @@ def _standing(name: str, rate_hz: float, p_hips: Array, R: Array) -> Motion:
     """The motion of these world rotations with the legs put on the feet's resting places."""
     ankles = _standing_ankles()
     hips = plant(p_hips, R[:, 0], ankles)
-    forward = np.broadcast_to([0.0, 0.0, 1.0], (len(R), 2, 3))
-    legs = rotations_to_ankles(hips, R[:, 0], ankles, forward)
-    R[:, LEGS[:, :2]] = np.stack(legs, axis=-3)
+    straight = np.broadcast_to(np.eye(3), (len(R), 2, 2, 3, 3))
+    R[:, LEGS[:, :2]] = rotations_to_ankles(hips, R[:, 0], ankles, straight)
     R_local = local_rotations(R)
     p_toes = forward_kinematics(R_local, hips)[0][:, LEGS[:, 3]]
     return Motion(name, "simulated", rate_hz, hips, R_local, p_toes, 1.0)

@@ -127,8 +127,8 @@ def _legs(p_hips: Array, R_hips: Array, p_ankles: Array, ends: Array, w: Array) 
 
     What the solver leaves out (a knee out of the plane, a twist) is blended from end to end.
     """
-    forward = slerp(ends[0, :, 0], ends[1, :, 0], w[:, None])[..., :, 2]
-    solved = np.stack(rotations_to_ankles(p_hips, R_hips, p_ankles, forward), axis=-3)
+    like = slerp(ends[0], ends[1], w[:, None, None])
+    solved = rotations_to_ankles(p_hips, R_hips, p_ankles, like)
     left_out = transpose(solved[[0, -1]]) @ ends
     return np.asarray(solved @ slerp(left_out[0], left_out[1], w[:, None, None]))
 

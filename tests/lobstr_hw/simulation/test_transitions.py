@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from support.motions import arms_down, walking
 
-from lobstr_hw.rotations import geodesic_angle, heading_angle, rotation_y
+from lobstr_hw.rotations import (
+    geodesic_angle,
+    heading_angle,
+    rotation_x,
+    rotation_y,
+    to_rotation_vector,
+)
 from lobstr_hw.simulation import eased, joined, moved
 from lobstr_hw.skeleton import Joint
 
@@ -68,6 +74,17 @@ def test_moving_there_and_back_is_staying() -> None:
     np.testing.assert_allclose(back.p_hips, walk.p_hips, atol=1e-12)
     np.testing.assert_allclose(back.R_local, walk.R_local, atol=1e-12)
     np.testing.assert_allclose(back.p_toes, walk.p_toes, atol=1e-12)
+
+
+@pytest.mark.parametrize("raised_deg", [60.0, 90.0, 120.0])
+def test_legs_do_not_flip_on_the_way_into_a_raised_leg(raised_deg: float) -> None:
+    standing = arms_down(1.0)
+    R = np.array(standing.R_local)
+    R[:, Joint.LEFT_UPPER_LEG] = rotation_x(-np.deg2rad(raised_deg))
+    R[:, Joint.LEFT_LOWER_LEG] = rotation_x(np.deg2rad(30.0))
+    kick = replace(standing, R_local=R)
+    R = joined([standing, kick, standing]).R_local
+    assert np.rad2deg(np.max(geodesic_angle(R[1:], R[:-1]))) < 15.0
 
 
 def test_motions_of_different_rates_are_refused() -> None:
