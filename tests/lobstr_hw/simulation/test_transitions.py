@@ -11,7 +11,6 @@ from lobstr_hw.rotations import (
     heading_angle,
     rotation_x,
     rotation_y,
-    to_rotation_vector,
 )
 from lobstr_hw.simulation import eased, joined, moved
 from lobstr_hw.skeleton import Joint
