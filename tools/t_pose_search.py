@@ -1,0 +1,89 @@
+"""Does the detector take anything else for a T-pose? Recorded motion is full of poses.
+
+    python tools/t_pose_search.py FOLDER [FOLDER ...] [--write]
+
+Every clip is worn by a simulated user without a T-pose before it. Captures often begin or end with
+a T-pose of their own, so each find is held against the true arms: how far from straight out?
+"""
+
+import argparse
+import datetime
+import importlib.util
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from lobstr_hw.calibration import TPose, TPoseDetector
+from lobstr_hw.retargeting import find_clips, retarget
+from lobstr_hw.rotations import Array, angle_between
+from lobstr_hw.simulation import SimulatedTake, simulate, take_samples
+from lobstr_hw.skeleton import Joint
+
+TITLE = "## T-poses in recordings"
+STRAIGHT_OUT_DEG = 25.0
+ARMS = ((Joint.LEFT_UPPER_ARM, Joint.LEFT_HAND), (Joint.RIGHT_UPPER_ARM, Joint.RIGHT_HAND))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folders", nargs="+", type=Path)
+    parser.add_argument("--write", action="store_true")
+    args = parser.parse_args()
+    text = "\n".join([_head(args.folders), *_table(args.folders)])
+    print(text)
+    if args.write:
+        path = Path(__file__).with_name("calibration_table.py")
+        spec = importlib.util.spec_from_file_location("calibration_table", path)
+        assert spec is not None
+        assert spec.loader is not None
+        table = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(table)
+        table.write_section(table.RESULTS, TITLE, text)
+    return 0
+
+
+def _table(folders: Sequence[Path]) -> list[str]:
+    rows = ["| set | pieces | minutes | finds | of these T-poses |", "|---|---|---|---|---|"]
+    for folder in folders:
+        seconds, off_deg = 0.0, []
+        motions = [m for m in retarget(find_clips([folder])) if m.duration_s >= 2.0]
+        for i, motion in enumerate(motions):
+            seconds += motion.duration_s
+            take = simulate(motion, i, rate_hz=45.0, t_pose_s=0.0)
+            hints = {serial: role for role, serial in take.serials.items()}
+            pose = TPoseDetector(hints, every_s=0.2).add(take_samples(take))
+            if pose is not None:
+                off_deg.append(_arms_off_deg(take, pose))
+        true = sum(off < STRAIGHT_OUT_DEG for off in off_deg)
+        rows.append(
+            f"| {folder.parent.name if folder.name == 'clips' else folder.name} | {len(motions)} "
+            f"| {seconds / 60.0:.0f} | {len(off_deg)} | {true} |"
+        )
+    return rows
+
+
+def _arms_off_deg(take: SimulatedTake, pose: TPose) -> float:
+    """The farther arm's angle from straight out to its side, in the middle of a find."""
+    i = int(np.searchsorted(take.truth_times_s, (pose.start_s + pose.end_s) / 2.0))
+    p: Array = take.truth_p[i]
+    across = p[Joint.LEFT_UPPER_ARM] - p[Joint.RIGHT_UPPER_ARM]
+    sides = (across, -across)
+    off = [angle_between(p[h] - p[s], out) for (s, h), out in zip(ARMS, sides, strict=True)]
+    return float(np.rad2deg(np.max(off)))
+
+
+def _head(folders: Sequence[Path]) -> str:
+    shown = " ".join("/".join(folder.parts[-2:]) for folder in folders)
+    date = datetime.datetime.now(tz=datetime.UTC).date()
+    return f"""{TITLE}
+
+Every clip worn by a simulated user; captures often begin or end with a T-pose of their own. A find
+counts as one when both arms are within {STRAIGHT_OUT_DEG:g} degrees of straight out.
+
+`python tools/t_pose_search.py {shown}`, {date}.
+"""
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
