@@ -30,6 +30,9 @@ TURN_ALLOWED_RAD = 0.35
 REACH_M = {TrackerRole.PELVIS: 1.3}
 """From the headset; a person of 1.95 m has 0.75 m between the two, and mounts add up to 0.3."""
 
+PLAY_SPACE_M = 1000.0
+"""Nobody plays farther from the origin than this."""
+
 SETTLE_S = 0.2
 """A new place is believed after the tracker has stayed consistent there for so long."""
 FRESH_S = 0.3
@@ -49,19 +52,26 @@ _GOOD = Verdict(True)
 
 @dataclass(slots=True)
 class _Seen:
-    """One pose that was taken for true (or is being watched)."""
+    """A pose that was taken for true (or is being watched); its position may be older."""
 
     time_s: float
     p: list[float] | None
+    p_time_s: float
     R: Array
+
+    def after(self, before: "_Seen | None") -> "_Seen":
+        """This pose, with the place known before where it has none of its own."""
+        if self.p is None and before is not None:
+            return _Seen(self.time_s, before.p, before.p_time_s, self.R)
+        return self
 
     def could_become(self, other: "_Seen", speed_limit_m_s: float) -> str:
         """Why a body part cannot get from here to there; empty if it can."""
-        dt = other.time_s - self.time_s
         if self.p is not None and other.p is not None:
-            if math.dist(self.p, other.p) > STEP_ALLOWED_M + speed_limit_m_s * dt:
+            way = speed_limit_m_s * (other.time_s - self.p_time_s)
+            if math.dist(self.p, other.p) > STEP_ALLOWED_M + way:
                 return "jump"
-        turn = TURN_ALLOWED_RAD + TURN_LIMIT_RAD_S * dt
+        turn = TURN_ALLOWED_RAD + TURN_LIMIT_RAD_S * (other.time_s - self.time_s)
         # trace(A^T B) = 1 + 2 cos(angle)
         if turn < math.pi and np.vdot(self.R, other.R) < 1.0 + 2.0 * math.cos(turn):
             return "spin"
@@ -98,7 +108,7 @@ class Gate:
         fault = _malformed(p, R) if math.isfinite(sample.time_s) else "nonfinite"
         if fault:
             return fault
-        seen = _Seen(sample.time_s, None if p is None else p.tolist(), R)
+        seen = _Seen(sample.time_s, None if p is None else p.tolist(), sample.time_s, R)
         return self._out_of_reach(role, seen) or self._implausible(role, seen)
 
     def _out_of_reach(self, role: TrackerRole, seen: _Seen) -> str:
@@ -117,7 +127,7 @@ class Gate:
         if fault and not self._settled(role, seen, limit):
             return fault
         self._new_place.pop(role, None)
-        self._good[role] = seen
+        self._good[role] = seen.after(good)
         return ""
 
     def _settled(self, role: TrackerRole, seen: _Seen, limit: float) -> bool:
@@ -125,7 +135,7 @@ class Gate:
         since_s, before = self._new_place.get(role, (seen.time_s, seen))
         if before.could_become(seen, limit):
             since_s = seen.time_s
-        self._new_place[role] = (since_s, seen)
+        self._new_place[role] = (since_s, seen.after(before))
         return seen.time_s - since_s >= SETTLE_S
 
 
@@ -135,6 +145,8 @@ def _malformed(p: Array | None, R: Array) -> str:
     total = sum(map(sum, rows)) + (0.0 if p is None else float(p[0] + p[1] + p[2]))
     if not math.isfinite(total):
         return "nonfinite"
+    if p is not None and max(map(abs, p.tolist())) > PLAY_SPACE_M:
+        return "too_far"
     if p is not None and not p.any() and rows == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]:
         return "zero_pose"  # what a lost device says
     return "" if _is_rotation(*rows) else "not_a_rotation"

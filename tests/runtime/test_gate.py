@@ -125,3 +125,18 @@ def test_roles_are_judged_apart() -> None:
     gate = Gate()
     gate.judge(HEAD, sample(0.0))
     assert gate.judge(HAND, sample(0.001, (3.0, 1.0, 3.0))).believed
+
+
+def test_a_gap_in_the_position_does_not_forget_where_the_tracker_was() -> None:
+    gate = Gate()
+    gate.judge(HEAD, sample(0.0))
+    assert gate.judge(HEAD, sample(1 / RATE_HZ, None)).believed
+    assert gate.judge(HEAD, sample(2 / RATE_HZ, (4.0, 1.6, 0.2))).reason == "jump"
+    assert gate.judge(HEAD, sample(3 / RATE_HZ)).believed
+
+
+def test_a_place_that_nobody_can_be_in_never_passes() -> None:
+    gate = Gate()
+    far = [sample(i / RATE_HZ, (1e300, 0.0, 0.0)) for i in range(100)]
+    assert not any(feed(gate, HEAD, far))
+    assert gate.events == {"too_far": 1}
