@@ -40,7 +40,8 @@ class Gait:
         knee_off_hinge: mean turn of the knee that is not flexion.
         foot_heading: mean of the feet in single stance, outward positive.
         foot_pitch: mean of a still foot, toes down positive.
-        head_pitch: mean forward tilt.
+        head_pitch: median forward tilt.
+        toe_ahead: mean of the toe bases, forward of the hips joint.
         asymmetry: largest difference of left and right among thigh, knee and foot means.
         stance_toe: median height of a still toe base.
         toe_error_mm: mean distance of the skeleton's toe base to the rig's.
@@ -56,6 +57,7 @@ class Gait:
     foot_heading: float
     foot_pitch: float
     head_pitch: float
+    toe_ahead: float
     asymmetry: float
     stance_toe: float
     toe_error_mm: float
@@ -63,12 +65,19 @@ class Gait:
 
 
 def walking_frames(motion: Motion) -> npt.NDArray[np.bool_]:
-    """Frames (F,) of walking straight ahead and upright, at 0.5 to 2 m/s of the standard size."""
+    """Frames (F,) of walking straight ahead and upright, at 0.5 to 2 m/s, for a second or more.
+
+    A lunge or a kick moves as fast, but not for as long.
+    """
     v = speed(motion.p_hips, motion.rate_hz, 0.5)
     ahead = heading(motion.R_local[:, Joint.HIPS])[:, :, 2]
     along = np.sum(v * ahead, axis=-1)
     fast = (along > 0.5) & (along < 2.0) & (along > 0.9 * np.hypot(v[:, 0], v[:, 2]))
-    return np.asarray(fast & (motion.p_hips[:, 1] > 0.9))
+    walks = fast & (motion.p_hips[:, 1] > 0.9)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], walks, [False]]).astype(int)))
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        walks[first:last] &= last - first >= motion.rate_hz
+    return np.asarray(walks)
 
 
 def _pitch(R: Array) -> Array:
@@ -93,6 +102,7 @@ def _frames(motion: Motion) -> dict[str, Array] | None:
     out = np.degrees(np.arctan2(feet[..., 0, 2], feet[..., 2, 2])) * [1.0, -1.0]
     still = v_toes < 0.2
     toes = p[:, [leg[3] for leg in _LEGS]]
+    ahead = (R_ref @ (toes - p[:, :1])[..., None])[..., 2, 0]
     error = 1000.0 * np.linalg.norm(toes - motion.p_toes[walk], axis=-1)
     reach = np.linalg.norm(
         p[:, [leg[2] for leg in _LEGS]] - p[:, [leg[0] for leg in _LEGS]], axis=-1
@@ -106,6 +116,7 @@ def _frames(motion: Motion) -> dict[str, Array] | None:
         "heading": np.where(still, out, np.nan),
         "foot": np.where(still, np.degrees(np.arcsin(-feet[..., 1, 2])), np.nan),
         "toe": np.where(still, 100.0 * toes[..., 1], np.nan),
+        "ahead": 100.0 * ahead,
         "error": error,
         "reach": reach / 0.84,
     }
@@ -141,7 +152,8 @@ def _gait(parts: Sequence[dict[str, Array]]) -> Gait:
         knee_off_hinge=float(np.mean(all_["off_hinge"])),
         foot_heading=float(np.nanmean(all_["heading"])),
         foot_pitch=float(np.nanmean(all_["foot"])),
-        head_pitch=float(np.mean(all_["head"])),
+        head_pitch=float(np.median(all_["head"])),
+        toe_ahead=float(np.mean(all_["ahead"])),
         asymmetry=float(max(abs(s[0] - s[1]) for s in sides)),
         stance_toe=float(np.nanmedian(all_["toe"])),
         toe_error_mm=float(np.mean(all_["error"])),
