@@ -5,6 +5,7 @@ fewer lines than it says are all read. A position channel replaces that coordina
 OFFSET, for the root and for any other joint: every exporter met so far means it so.
 """
 
+import re
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,10 @@ from lobstr_hw.errors import MotionFileError
 from lobstr_hw.rotations import Array
 
 __all__ = ["Bvh", "hierarchy", "motion_line", "read_bvh", "read_skeleton", "write_bvh"]
+
+
+_MOTION = re.compile(r"^[ \t]*MOTION[ \t\r]*$", re.MULTILINE)
+"""Alone on its line: a joint may have the word in its name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +63,7 @@ def read_skeleton(path: str | Path) -> tuple[tuple[str, ...], Array]:
     Raises:
         MotionFileError: as :func:`read_bvh`.
     """
-    layout = _parse_hierarchy(_read_text(Path(path)).partition("MOTION")[0], Path(path))
+    layout = _parse_hierarchy(_MOTION.split(_read_text(Path(path)), maxsplit=1)[0], Path(path))
     offsets = np.array(layout.offsets)
     offsets[[joint for joint, word in layout.channels if word.endswith("position")]] = 0.0
     return tuple(layout.names), offsets
@@ -81,14 +86,17 @@ def read_bvh(path: str | Path) -> Bvh:
         MotionFileError: the file is missing or no BVH; the message names the line.
     """
     path = Path(path)
-    head, found, motion = _read_text(path).partition("MOTION")
-    if not found:
+    text = _read_text(path)
+    mark = _MOTION.search(text)
+    head = text[: mark.start()] if mark else text
+    if not mark:
         raise MotionFileError(
             f"{path}: line {head.count(chr(10)) + 1}: the file ends without a MOTION section. "
             "Is this a whole BVH file?"
         )
     layout = _parse_hierarchy(head, path)
     first_line = head.count("\n") + 1
+    motion = text[mark.end() :]
     frames, frame_time_s, numbers, line = _parse_motion_head(motion, path, first_line)
     values = _parse_numbers(numbers, len(layout.channels), path, line)[:frames]
     if not len(values):

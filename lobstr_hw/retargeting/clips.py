@@ -56,7 +56,7 @@ def find_clips(paths: Iterable[str | Path], metres_per_unit: float | None = None
     found: dict[Path, None] = {}
     for path in map(Path, paths):
         if path.is_dir():
-            found.update(dict.fromkeys(sorted(path.rglob("*.bvh"))))
+            found.update(dict.fromkeys(sorted(p for p in path.rglob("*") if _is_bvh(p))))
         elif path.is_file():
             found[path] = None
         else:
@@ -65,6 +65,10 @@ def find_clips(paths: Iterable[str | Path], metres_per_unit: float | None = None
         raise FileFormatError("no .bvh file in " + ", ".join(map(str, paths)) + ". Check the path.")
     manifests: dict[Path, dict[str, dict[str, str]]] = {}
     return [_clip(path, manifests, metres_per_unit) for path in found]
+
+
+def _is_bvh(path: Path) -> bool:
+    return path.suffix.lower() == ".bvh" and path.is_file()
 
 
 def _clip(

@@ -113,6 +113,12 @@ def test_fewer_lines_than_frames_says_are_taken_as_they_are(tmp_path: Path) -> N
     assert len(odd(tmp_path)) == 2
 
 
+def test_a_joint_may_be_called_motion(tmp_path: Path) -> None:
+    path = write(tmp_path / "named.bvh", ODD.replace("Spine", "MOTION_Spine"))
+    assert read_bvh(path).names == ("Hips", "MOTION_Spine")
+    assert len(read_bvh(path)) == 2
+
+
 def test_a_last_line_that_breaks_off_is_left_out(tmp_path: Path) -> None:
     path = write(tmp_path / "cut.bvh", ODD.replace(" -60\r\n", "").replace("\t-60\r\n", ""))
     assert len(read_bvh(path)) == 1
