@@ -2,6 +2,8 @@
 
 import pytest
 
+pytest.register_assert_rewrite("support.driver_contract")  # its asserts explain themselves too
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--hardware", action="store", metavar="DRIVER", help="run on a real device")
