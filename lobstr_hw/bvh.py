@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lobstr_hw.bvh_hierarchy import Layout, parse_hierarchy
 from lobstr_hw.bvh_writer import hierarchy, motion_line, write_bvh
 from lobstr_hw.errors import MotionFileError
 from lobstr_hw.rotations import Array
@@ -63,20 +64,10 @@ def read_skeleton(path: str | Path) -> tuple[tuple[str, ...], Array]:
     Raises:
         MotionFileError: as :func:`read_bvh`.
     """
-    layout = _parse_hierarchy(_MOTION.split(_read_text(Path(path)), maxsplit=1)[0], Path(path))
+    layout = parse_hierarchy(_MOTION.split(_read_text(Path(path)), maxsplit=1)[0], Path(path))
     offsets = np.array(layout.offsets)
     offsets[[joint for joint, word in layout.channels if word.endswith("position")]] = 0.0
     return tuple(layout.names), offsets
-
-
-@dataclass(slots=True)
-class _Layout:
-    """What the hierarchy says; ``channels`` are (joint, word) in the order of the numbers."""
-
-    names: list[str]
-    parents: list[int]
-    offsets: list[list[float]]
-    channels: list[tuple[int, str]]
 
 
 def read_bvh(path: str | Path) -> Bvh:
@@ -94,7 +85,7 @@ def read_bvh(path: str | Path) -> Bvh:
             f"{path}: line {head.count(chr(10)) + 1}: the file ends without a MOTION section. "
             "Is this a whole BVH file?"
         )
-    layout = _parse_hierarchy(head, path)
+    layout = parse_hierarchy(head, path)
     first_line = head.count("\n") + 1
     motion = text[mark.end() :]
     frames, frame_time_s, numbers, line = _parse_motion_head(motion, path, first_line)
@@ -112,74 +103,6 @@ def _read_text(path: Path) -> str:
         return path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise MotionFileError(f"{path}: cannot be read ({error}). Check the path.") from error
-
-
-def _parse_hierarchy(head: str, path: Path) -> _Layout:
-    out = _Layout([], [], [], [])
-    stack: list[int] = []  # open braces; -2 is an End Site
-    pending: int | None = None
-    for number, line in enumerate(head.splitlines(), start=1):
-        words = line.replace("{", " { ").replace("}", " } ").split()
-        try:
-            pending = _hierarchy_line(words, out, stack, pending)
-        except (ValueError, IndexError) as error:
-            raise MotionFileError(
-                f"{path}: line {number}: cannot be understood: {line.strip()!r} ({error}). "
-                "Export the clip again as BVH."
-            ) from error
-    if not out.names:
-        raise MotionFileError(f"{path}: no ROOT before MOTION. Is this a BVH file?")
-    if stack:
-        raise MotionFileError(
-            f"{path}: line {head.count(chr(10)) + 1}: {len(stack)} brace(s) still open at MOTION. "
-            "The file is damaged; export the clip again."
-        )
-    return out
-
-
-def _hierarchy_line(
-    words: list[str], out: _Layout, stack: list[int], pending: int | None
-) -> int | None:
-    while words:
-        word = words.pop(0)
-        if word == "HIERARCHY":
-            continue
-        if word in ("ROOT", "JOINT"):
-            out.names.append(" ".join(words[: words.index("{")] if "{" in words else words))
-            words = words[words.index("{") :] if "{" in words else []
-            out.parents.append(stack[-1] if stack else -1)
-            out.offsets.append([0.0, 0.0, 0.0])
-            pending = len(out.names) - 1
-        elif word == "End":
-            words, pending = [w for w in words if w in "{}"], -2
-        elif word == "{":
-            if pending is None:
-                raise ValueError("a brace without a joint")
-            stack.append(pending)
-            pending = None
-        elif word == "}":
-            stack.pop()
-        elif word == "OFFSET":
-            offset = [float(w) for w in words[:3]]
-            if len(offset) != 3:
-                raise ValueError("OFFSET needs three numbers")
-            if stack[-1] >= 0:
-                out.offsets[stack[-1]] = offset
-            words = words[3:]
-        elif word == "CHANNELS":
-            count = int(words[0])
-            channels = words[1 : 1 + count]
-            if len(channels) != count or not all(map(_is_channel, channels)):
-                raise ValueError(f"CHANNELS {count} with {channels}")
-            out.channels.extend((stack[-1], c) for c in channels)
-            words = words[1 + count :]
-        else:
-            raise ValueError(f"unknown word {word!r}")
-    return pending
-
-
-def _is_channel(word: str) -> bool:
-    return word[:1] in "XYZ" and word[1:] in ("position", "rotation")
 
 
 def _parse_motion_head(motion: str, path: Path, line: int) -> tuple[int, float, str, int]:
@@ -231,7 +154,7 @@ def _bad_number(text: str, path: Path, line: int) -> MotionFileError:
     return MotionFileError(f"{path}: the motion lines from {line} on cannot be read as numbers.")
 
 
-def _assemble(layout: _Layout, values: Array, frame_time_s: float) -> Bvh:
+def _assemble(layout: Layout, values: Array, frame_time_s: float) -> Bvh:
     frames, joints = len(values), len(layout.names)
     offsets = np.array(layout.offsets)
     p = np.repeat(offsets[None], frames, axis=0)
