@@ -1,0 +1,127 @@
+"""A thread that reads a device, so that nobody else waits for it."""
+
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from threading import Event, Thread
+from typing import Protocol
+
+from lobstr_hw.errors import DriverError
+from lobstr_hw.poses import PartialPose
+from lobstr_hw.trackers import TrackingState
+
+__all__ = ["Arrival", "Command", "LinkLost", "Lost", "Reading", "ReadingThread", "Source"]
+
+QUEUE_LENGTH = 512
+"""Half a second of four stations at 240 Hz; the runtime keeps 0.3 s itself."""
+RETRY_S = 0.5
+"""How often a lost device is looked for: quick for a person, and nothing for the machine."""
+
+
+class LinkLost(Exception):
+    """The device is gone; seen by the reading thread only."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reading:
+    """What one record of a device says about one tracker.
+
+    Attributes:
+        serial: of the tracker.
+        T_world_tracker: in our world already (docs/conventions.md), or None: nothing about a pose.
+        state: anything but ok and inertial counts as not tracked.
+        device_s: the device's own time, or None where it has no clock.
+        buttons: those held down, or None: nothing about buttons.
+    """
+
+    serial: str
+    T_world_tracker: PartialPose | None
+    state: TrackingState = TrackingState.OK
+    device_s: float | None = None
+    buttons: frozenset[str] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """Somebody asks for something: calibrate, recentre, freeze, seat."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """The device is gone, all trackers with it, or only the named one."""
+
+    serial: str | None = None
+
+
+Arrival = Reading | Command | Lost
+
+
+class Source(Protocol):
+    """An open device."""
+
+    def read(self) -> Sequence[Arrival]:
+        """What came in; waits 0.1 s at most; LinkLost or OSError when the device is gone."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the device; never raises."""
+        ...
+
+
+class ReadingThread:
+    """Fills a short queue that drops its oldest; looks for the device again when it is lost."""
+
+    def __init__(self, connect: Callable[[], Source]) -> None:
+        """Connect now, so that its errors reach the caller; then read in the background."""
+        self._connect = connect
+        self._source: Source | None = connect()
+        self._arrivals: deque[tuple[float, Arrival]] = deque(maxlen=QUEUE_LENGTH)
+        self._stop = Event()
+        self._thread = Thread(target=self._run, name="lobstr-driver", daemon=True)
+        self._thread.start()
+
+    def take(self) -> list[tuple[float, Arrival]]:
+        """All that came in since the last call, oldest first, each with its age in seconds."""
+        taken = [self._arrivals.popleft() for _ in range(len(self._arrivals))]
+        now = time.perf_counter()
+        return [(now - arrived, arrival) for arrived, arrival in taken]
+
+    def close(self) -> None:
+        """Stop reading and let go of the device."""
+        self._stop.set()
+        self._thread.join(timeout=5.0)
+
+    def _run(self) -> None:
+        try:
+            while not self._stop.is_set():
+                if self._source is None:
+                    self._look_again()
+                else:
+                    self._read(self._source)
+        finally:
+            self._put(Lost())  # also when a bug ends this thread: the loop sees it as a lost device
+            if self._source is not None:
+                self._source.close()
+
+    def _read(self, source: Source) -> None:
+        try:
+            for arrival in source.read():
+                self._put(arrival)
+        except (LinkLost, OSError):
+            self._source = None
+            source.close()
+            self._put(Lost())
+
+    def _look_again(self) -> None:
+        if self._stop.wait(RETRY_S):
+            return
+        try:
+            self._source = self._connect()
+        except (DriverError, LinkLost, OSError):
+            self._source = None
+
+    def _put(self, arrival: Arrival) -> None:
+        self._arrivals.append((time.perf_counter(), arrival))

@@ -1,0 +1,77 @@
+"""A device at the far end of a pseudo-terminal, behind the real pyserial."""
+
+import importlib.util
+import os
+import select
+import sys
+import threading
+from pathlib import Path
+
+from support.beds import need
+
+__all__ = ["SerialDevice", "need_serial"]
+
+
+def need_serial() -> None:
+    """Skip, or fail in a build, without pseudo-terminals and pyserial."""
+    need("a pseudo-terminal", "run this test on Linux or macOS", sys.platform != "win32")
+    has_serial = importlib.util.find_spec("serial") is not None
+    need("pyserial", "pip install 'lobstr-hw[hid]'", has_serial)
+
+
+class SerialDevice:
+    """Obeys what is written to it; ``path`` stays the same when it is plugged in again."""
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / "tty-of-the-device"
+        self.commands: list[bytes] = []
+        self._lock = threading.RLock()
+        self._master = -1
+        self._thread: threading.Thread | None = None
+        self.plug()
+
+    def plug(self) -> None:
+        """A new pseudo-terminal under the old name."""
+        import pty
+        import tty
+
+        self._master, slave = pty.openpty()
+        tty.setraw(slave)
+        self.path.unlink(missing_ok=True)
+        self.path.symlink_to(os.ttyname(slave))
+        self._pipe = os.pipe()
+        self._slave = slave
+        self.power_on()
+        self._thread = threading.Thread(target=self._listen, args=(self._master, self._pipe[0]))
+        self._thread.start()
+
+    def cut(self) -> None:
+        """Pull the plug."""
+        if self._thread is None:
+            return
+        os.write(self._pipe[1], b"x")
+        self._thread.join()
+        self._thread = None
+        for descriptor in (*self._pipe, self._master, self._slave):
+            os.close(descriptor)
+
+    def send(self, data: bytes) -> None:
+        """Put bytes on the line."""
+        with self._lock:
+            os.write(self._master, data)
+
+    def power_on(self) -> None:
+        """Forget what was set up."""
+
+    def obey(self, data: bytes) -> bytes:
+        """Do what is asked for; give back what is not a whole command yet."""
+        raise NotImplementedError
+
+    def _listen(self, master: int, pipe: int) -> None:
+        rest = b""
+        while True:
+            ready, _, _ = select.select([master, pipe], [], [])
+            if pipe in ready:
+                return
+            with self._lock:
+                rest = self.obey(rest + os.read(master, 4096))
