@@ -95,7 +95,7 @@ def test_every_plain_module_imports_where_unix_modules_are_missing() -> None:
 def test_importing_the_ground_floor_brings_no_extras() -> None:
     code = (
         "import sys, lobstr_hw, lobstr_hw.avatar, lobstr_hw.predictors;"
-        "print([m for m in ('torch', 'scipy', 'hid', 'usb', 'serial', 'matplotlib')"
+        "print([m for m in ('torch', 'scipy', 'hid', 'usb', 'serial', 'openvr', 'xr', 'matplotlib')"
         " if m in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
