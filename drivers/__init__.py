@@ -16,6 +16,7 @@ __all__ = ["DRIVERS", "driver_class", "load_driver", "split_driver_spec"]
 DRIVERS: Mapping[str, tuple[str, str]] = {
     "fake": ("lobstr_hw.drivers.fake", "FakeDriver"),
     "openvr": ("lobstr_hw.drivers.openvr", "OpenVRDriver"),
+    "polhemus": ("lobstr_hw.drivers.polhemus", "PolhemusDriver"),
     "replay": ("lobstr_hw.drivers.replay", "ReplayDriver"),
 }
 """Name to module and class."""
