@@ -75,7 +75,10 @@ def test_a_slow_writer_makes_the_loop_wait_and_memory_stays_bounded() -> None:
 
     thread = threading.Thread(target=loop)
     thread.start()
-    thread.join(0.3)
+    for _ in range(1000):
+        if output.backlog == QUEUED_FRAMES:
+            break
+        thread.join(0.01)
     assert thread.is_alive()
     assert len(sent) <= QUEUED_FRAMES + 1
     assert output.backlog <= QUEUED_FRAMES
