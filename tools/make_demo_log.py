@@ -28,7 +28,7 @@ SETS = ("snu_tiling_patch", "snu_ys2010")
 SPLIT = ROOT / "lobstr_hw" / "training" / "splits" / "default.json"
 LARGEST_BYTES = 3_000_000
 LARGEST_M = 3.3
-SEED, HEIGHT_CM = 58, 172
+SEED, HEIGHT_CM = 72, 172
 
 
 @dataclass(frozen=True, slots=True)
