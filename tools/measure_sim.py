@@ -121,7 +121,11 @@ def body_rows(live: LiveSession, capture: Capture) -> list[tuple[str, str]]:
         near = in_reach(role, p, targets[:, i], body)
         inside = f"{1e3 * off[near].max():.2f} mm" if near.any() else "never in reach"
         rows.append((f"{role} to its target, in reach, max", inside))
-        rows.append((f"{role} out of reach", f"{100.0 * np.mean(~near):.1f} % of the frames"))
+        short = f", by {1e3 * np.median(off[~near]):.1f} / {1e3 * off[~near].max():.1f} mm"
+        share = f"{100.0 * np.mean(~near):.1f} % of the frames"
+        rows.append(
+            (f"{role} out of reach, by median / max", share + (short if (~near).any() else ""))
+        )
     rows.append(("lowest sole point", f"{1e3 * lowest_sole_m(p, R, body):.1f} mm"))
     return rows
 
