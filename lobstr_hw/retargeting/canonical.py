@@ -156,19 +156,24 @@ class _Fit:
             axis = self._canonical(Joint.HIPS)[:, :, 0] if hinge is None else hinge
             self.A[upper] = self._along(upper, -thigh, axis)
             self.A[lower] = self._along(lower, -shin, axis)
-        self._foot(foot, toes, self.e.flat[:, side])
+        self._foot(foot, toes, side)
 
-    def _foot(self, foot: Joint, toes: Joint, flat: Bools) -> None:
+    def _foot(self, foot: Joint, toes: Joint, side: int) -> None:
+        flat = self.e.flat[:, side]
         bone = _direction(self._inside(foot, self.e.p[:, toes] - self.e.p[:, foot]))
         if flat.sum() >= _LEAST_FLAT:
-            up = self._inside(foot, np.broadcast_to(_UP, (len(flat), 3)))[flat]
-            self.A[foot] = _frame(y=_direction(up), z=bone, first="y")
+            self.A[foot] = self._foot_frame(foot, bone, flat)
         else:
             self.notes.append(f"{foot.name}: {flat.sum() / RATE_HZ:.1f} s of flat stance")
             if self._instead(foot, toes):
                 return
-            self.A[foot] = _frame(y=self.A[Joint.HIPS][:, 1], z=bone, first="y")
+            flat = self.e.low[:, side] if self.e.low[:, side].any() else np.ones_like(flat)
+            self.A[foot] = self._foot_frame(foot, bone, flat)
         self._follow(toes, self._canonical(foot), flat, foot)
+
+    def _foot_frame(self, foot: Joint, bone: Array, flat: Bools) -> Array:
+        up = self._inside(foot, np.broadcast_to(_UP, (len(flat), 3)))[flat]
+        return _frame(y=_direction(up), z=bone, first="y")
 
     def _hinge(self, upper: Array, lower: Array, name: str) -> Array | None:
         """World axis (F, 3) of a hinge; NaN in frames that do not show it; None if none does."""

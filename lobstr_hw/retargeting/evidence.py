@@ -34,6 +34,7 @@ class Evidence:
         R: (F, 22, 3, 3) the rig's frames.
         upright: (F,) walking forward upright, or standing where there is too little walking.
         flat: (F, 2) a foot stands flat and still.
+        low: (F, 2) a foot is about as low as it gets: where it never stands flat for long.
         walking_s: seconds of walking forward upright.
         notes: what there was too little of.
     """
@@ -42,6 +43,7 @@ class Evidence:
     R: Array
     upright: Bools
     flat: Bools
+    low: Bools
     walking_s: float
     notes: tuple[str, ...]
 
@@ -49,7 +51,9 @@ class Evidence:
 def gather(clips: Sequence[SourceClip]) -> Evidence:
     """Thin out, join, and find the walking and standing frames."""
     parts = [_part(clip) for clip in clips]
-    p, R, flat, forward, height = (np.concatenate(column) for column in zip(*parts, strict=True))
+    p, R, flat, low, forward, height = (
+        np.concatenate(column) for column in zip(*parts, strict=True)
+    )
     tall = height > 0.94 * np.percentile(height, 95.0)
     lean = angle_between(trunk_line(p), np.array([0.0, 1.0, 0.0]))
     walking, notes = tall & forward & (lean < _LEAN), []
@@ -62,10 +66,10 @@ def gather(clips: Sequence[SourceClip]) -> Evidence:
     if walking.sum() < _LEAST_UPRIGHT_S * RATE_HZ:
         notes.append("no upright pose")
         walking = np.zeros_like(walking)
-    return Evidence(p, R, walking, flat, walking_s, tuple(notes))
+    return Evidence(p, R, walking, flat, low, walking_s, tuple(notes))
 
 
-def _part(clip: SourceClip) -> tuple[Array, Array, Bools, Bools, Array]:
+def _part(clip: SourceClip) -> tuple[Array, Array, Bools, Bools, Bools, Array]:
     centre = clip.hip_centre()
     v = speed(centre, clip.rate_hz, 0.5)
     side = clip.p[:, Joint.LEFT_UPPER_LEG] - clip.p[:, Joint.RIGHT_UPPER_LEG]
@@ -76,7 +80,9 @@ def _part(clip: SourceClip) -> tuple[Array, Array, Bools, Bools, Array]:
     forward = (along > 0.85 * across) & (along > _WALK_M_S[0]) & (along < _WALK_M_S[1])
     thin = slice(0, None, max(1, round(clip.rate_hz / RATE_HZ)))
     flat = flat_stance(clip)
-    return clip.p[thin], clip.R[thin], flat[thin], forward[thin], (centre[:, 1] - lowest)[thin]
+    height = centre[:, 1] - lowest
+    low = _low(clip)
+    return clip.p[thin], clip.R[thin], flat[thin], low[thin], forward[thin], height[thin]
 
 
 def trunk_line(p: Array) -> Array:
@@ -100,6 +106,15 @@ def flat_stance(clip: SourceClip) -> Bools:
         if still.any():
             still &= np.abs(height - np.median(height[still])) < _FLAT_M
     return np.asarray(still)
+
+
+def _low(clip: SourceClip) -> Bools:
+    """Frames (F, 2) in which ankle and toe base are both in the lower third of their heights."""
+    out = np.ones((len(clip), 2), dtype=bool)
+    for k in (2, 3):
+        height = clip.p[:, [leg[k] for leg in LEGS], 1]
+        out &= height <= np.percentile(height, 33.0, axis=0)
+    return out
 
 
 def _still(clip: SourceClip, joints: list[Joint]) -> Bools:

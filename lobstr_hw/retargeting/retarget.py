@@ -111,7 +111,7 @@ def _fit(
         if not whole:
             whole.append(fit_frames(_evidence(rig)))
         frames = fit_frames(sources, whole[0])
-    how = "from everybody on this rig" if whole else "from the zero pose or standing poses"
+    how = "from everybody on this rig" if whole else "from what there is"
     for text in frames.notes:
         say(Note(members[0].name, f"{members[0].subject}: {text}: frames {how}"))
     if not sources[0].unit_told:
