@@ -3,8 +3,8 @@
 Everything unknown is normally distributed (priors.py), the twelve coordinates follow from it, so
 the answer is a weighted least-squares fit (Gauss-Newton; the model is nearly linear).
 What eyes, hands and belt say about the hips is combined with the right weights by itself: a
-centimetre of the headset's height raises the hips by 0.36 cm, one of the belt tracker's by 0.23, of
-both hands' by 0.12, and a centimetre of the span by 0.02 (derived in docs/calibration.md).
+centimetre of the headset's height raises the hips by 0.40 cm, one of the belt tracker's by 0.23, of
+both hands' by 0.07, and a centimetre of the span by 0.03 (derived in docs/calibration.md).
 """
 
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ import numpy as np
 
 from lobstr_hw.calibration.priors import (
     ARM_DEVIATION,
+    ARM_LIFT_DEVIATIONS,
     BELLY_LEVER,
     BELLY_LEVER_DEVIATION,
     EYES_DEVIATION,
     EYES_OF_STATURE,
     HIPS_OF_STATURE,
     LEG_DEVIATION,
-    POSE_DEVIATION,
     TRUNK_DEVIATION,
     WAND_LEVER,
     WAND_LEVER_DEVIATION,
@@ -37,7 +37,7 @@ from lobstr_hw.skeleton import STANDARD_OFFSETS, STATURE, Body, Joint
 
 __all__ = ["Measures", "fit_measures"]
 
-STEPS = 5
+STEPS = 8
 _FREE_M = 100.0  # no opinion
 _GIVEN_M = 0.0005  # what somebody typed in overrules the headset
 _MEASURED_M = np.array([0.006, 0.012, 0.012, 0.012])
@@ -147,7 +147,7 @@ def _prior(p: Array, stature_m: float | None) -> tuple[Array, Array]:
             sizes,
             np.full(2, _FREE_M),
             np.full(2, TRUNK_DEVIATION),
-            np.full(4, POSE_DEVIATION),
+            np.tile(ARM_LIFT_DEVIATIONS, 2),
             EYES_DEVIATION,
             WAND_LEVER_DEVIATION,
             WAND_LEVER_DEVIATION,

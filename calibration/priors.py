@@ -13,6 +13,7 @@ from lobstr_hw.rotations import Array, rotation_y
 
 __all__ = [
     "ARM_DEVIATION",
+    "ARM_LIFT_DEVIATIONS",
     "BELLY_LEVER",
     "BELLY_LEVER_DEVIATION",
     "EYES_DEVIATION",
@@ -36,6 +37,8 @@ ARM_DEVIATION = 0.03
 
 POSE_DEVIATION = np.deg2rad(3.5)
 """About each axis, of a segment that stands off the T-pose by up to 10 degrees about any axis."""
+ARM_LIFT_DEVIATIONS: Array = frozen(np.deg2rad([6.0, 4.0]), (2,))
+"""Of an arm's direction, up and forward: in recorded T-poses arms droop by up to 19 degrees."""
 TRUNK_DEVIATION = np.deg2rad(1.5)
 """Of the back against the vertical; people feel this one better than their arms."""
 

@@ -80,7 +80,7 @@ def _section(motions: Sequence[Motion], users: int, seed: int, deviation_deg: fl
         else "### An ideal T-pose (what is left is the method's own)"
     )
     found = f"T-pose found, with the right roles, for {len(cases)} of {users} users."
-    return "\n".join([head, "", found, "", *_offsets(cases), "", *_measures(cases), ""])
+    return "\n".join([head, "", found, "", *offsets_table(cases), "", *measures_table(cases), ""])
 
 
 def _cases(
@@ -99,7 +99,7 @@ def _cases(
             yield Case(take, pose, calibrate_t_pose(pose))
 
 
-def _offsets(cases: Sequence[Case]) -> list[str]:
+def offsets_table(cases: Sequence[Case]) -> list[str]:
     rows = [
         "| median / 95th percentile | rotation, degrees | its tilt | its heading | position, cm |",
         "|---|---|---|---|---|",
@@ -130,7 +130,7 @@ def _row(name: str, mounts: Sequence[Pose], found: Sequence[Array], off_m: Seque
     return "| ".join(["", name + " ", *(_two(v) + " " for v in values)]) + "|"
 
 
-def _measures(cases: Sequence[Case]) -> list[str]:
+def measures_table(cases: Sequence[Case], *, heading: bool = True) -> list[str]:
     bodies = [case.take.user.body for case in cases]
     true_hips = np.array([1.0 / body.scale[0] for body in bodies])
     found_hips = np.array([1.0 / case.calibration.scale for case in cases])
@@ -156,7 +156,7 @@ def _measures(cases: Sequence[Case]) -> list[str]:
     return [
         "| | median / 95th percentile |",
         "|---|---|",
-        *(f"| {name} | {_two(values)} |" for name, values in rows),
+        *(f"| {name} | {_two(values)} |" for name, values in rows[0 if heading else 2 :]),
     ]
 
 

@@ -3,25 +3,30 @@
     python tools/t_pose_search.py FOLDER [FOLDER ...] [--write]
 
 Every clip is worn by a simulated user without a T-pose before it. Captures often begin or end with
-a T-pose of their own, so each find is held against the true arms: how far from straight out?
+a T-pose of their own, so each find is held against the true arms: how far from straight out? Those
+are T-poses of real people, sloppier than simulated ones: what they calibrate to is told as well.
 """
 
 import argparse
 import datetime
 import importlib.util
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
-from lobstr_hw.calibration import TPose, TPoseDetector
+from lobstr_hw.calibration import TPose, TPoseDetector, calibrate_t_pose
+from lobstr_hw.motion import Motion
 from lobstr_hw.retargeting import find_clips, retarget
 from lobstr_hw.rotations import Array, angle_between
 from lobstr_hw.simulation import SimulatedTake, simulate, take_samples
 from lobstr_hw.skeleton import Joint
 
 TITLE = "## T-poses in recordings"
-STRAIGHT_OUT_DEG = 25.0
+STRAIGHT_OUT_DEG = 30.0
+USERS = 8
 ARMS = ((Joint.LEFT_UPPER_ARM, Joint.LEFT_HAND), (Joint.RIGHT_UPPER_ARM, Joint.RIGHT_HAND))
 
 
@@ -30,37 +35,66 @@ def main() -> int:
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--write", action="store_true")
     args = parser.parse_args()
-    text = "\n".join([_head(args.folders), *_table(args.folders)])
+    table = _calibration_table()
+    text = "\n".join([_head(args.folders), *_report(table, args.folders)])
     print(text)
     if args.write:
-        path = Path(__file__).with_name("calibration_table.py")
-        spec = importlib.util.spec_from_file_location("calibration_table", path)
-        assert spec is not None
-        assert spec.loader is not None
-        table = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(table)
         table.write_section(table.RESULTS, TITLE, text)
     return 0
 
 
-def _table(folders: Sequence[Path]) -> list[str]:
+def _calibration_table() -> ModuleType:
+    """The neighbour that makes tables; tools are scripts, not a package."""
+    path = Path(__file__).with_name("calibration_table.py")
+    spec = importlib.util.spec_from_file_location("calibration_table", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+def _report(table: ModuleType, folders: Sequence[Path]) -> list[str]:
     rows = ["| set | pieces | minutes | finds | of these T-poses |", "|---|---|---|---|---|"]
+    cases: list[object] = []
     for folder in folders:
-        seconds, off_deg = 0.0, []
+        seconds, finds, true = 0.0, 0, 0
         motions = [m for m in retarget(find_clips([folder])) if m.duration_s >= 2.0]
         for i, motion in enumerate(motions):
             seconds += motion.duration_s
             take = simulate(motion, i, rate_hz=45.0, t_pose_s=0.0)
             hints = {serial: role for role, serial in take.serials.items()}
             pose = TPoseDetector(hints, every_s=0.2).add(take_samples(take))
-            if pose is not None:
-                off_deg.append(_arms_off_deg(take, pose))
-        true = sum(off < STRAIGHT_OUT_DEG for off in off_deg)
+            if pose is None:
+                continue
+            finds += 1
+            if _arms_off_deg(take, pose) < STRAIGHT_OUT_DEG:
+                true += 1
+                cases += list(_users(table, motion, i))
         rows.append(
             f"| {folder.parent.name if folder.name == 'clips' else folder.name} | {len(motions)} "
-            f"| {seconds / 60.0:.0f} | {len(off_deg)} | {true} |"
+            f"| {seconds / 60.0:.0f} | {finds} | {true} |"
         )
-    return rows
+    return [
+        *rows,
+        "",
+        f"What these T-poses calibrate to, each worn by {USERS} users ({len(cases)} cases):",
+        "",
+        *table.offsets_table(cases),
+        "",
+        *table.measures_table(cases, heading=False),
+    ]
+
+
+def _users(table: ModuleType, motion: Motion, first: int) -> Iterator[object]:
+    """The same T-pose on other bodies, with other mounts."""
+    for user in range(USERS):
+        take = simulate(motion, first + 10_000 * user, rate_hz=45.0, t_pose_s=0.0)
+        hints = {serial: role for role, serial in take.serials.items()}
+        pose = TPoseDetector(hints, every_s=0.2).add(take_samples(take))
+        if pose is not None:
+            yield table.Case(take, pose, calibrate_t_pose(pose))
 
 
 def _arms_off_deg(take: SimulatedTake, pose: TPose) -> float:
