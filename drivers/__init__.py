@@ -18,6 +18,7 @@ DRIVERS: Mapping[str, tuple[str, str]] = {
     "openvr": ("lobstr_hw.drivers.openvr", "OpenVRDriver"),
     "polhemus": ("lobstr_hw.drivers.polhemus", "PolhemusDriver"),
     "replay": ("lobstr_hw.drivers.replay", "ReplayDriver"),
+    "vmc": ("lobstr_hw.drivers.vmc", "VmcDriver"),
 }
 """Name to module and class."""
 
