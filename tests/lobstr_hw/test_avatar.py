@@ -327,3 +327,27 @@ def test_a_predictor_that_lags_is_refused_by_name() -> None:
 
 def test_the_standard_foot_is_assumed_above() -> None:
     np.testing.assert_allclose(STANDARD_OFFSETS[Joint.LEFT_TOES], [0.0, -0.043, 0.120])
+
+
+def test_nonsense_from_the_trackers_still_gives_a_body() -> None:
+    rng, n = np.random.default_rng(41), 100
+    avatar = Avatar(FakePredictor(), Body.standard(n))
+    state, valid = avatar.start(), np.ones((n, 4), dtype=bool)
+    lengths = np.linalg.norm(STANDARD_OFFSETS[1:], axis=-1)
+    half_turns = np.array([np.diag(d) for d in ([1.0, -1, -1], [-1.0, 1, -1], [-1.0, -1, 1])])
+    for k in range(15):
+        p = rng.normal(size=(n, 4, 3)) * rng.choice([0.0, 0.01, 0.3, 100.0], size=(n, 1, 1))
+        R = from_rotation_vector(
+            rng.normal(size=(n, 4, 3)) * rng.choice([0.0, 1.0], size=(n, 1, 1))
+        )
+        R[:3] = half_turns[:, None]
+        frame = Frame(k / 45.0, FOUR_POINTS, p, R, valid, valid)
+        state, pose = avatar.step(state, frame, [frame])
+        bones = pose.p_world[:, 1:] - pose.p_world[:, PARENTS[1:]]
+        np.testing.assert_allclose(
+            np.linalg.norm(bones, axis=-1), np.tile(lengths, (n, 1)), atol=1e-6
+        )
+        identity = np.broadcast_to(np.eye(3), (n, 22, 3, 3))
+        np.testing.assert_allclose(
+            pose.R_local @ np.swapaxes(pose.R_local, -1, -2), identity, atol=1e-6
+        )
