@@ -15,6 +15,7 @@ __all__ = ["DRIVERS", "driver_class", "load_driver", "split_driver_spec"]
 
 DRIVERS: Mapping[str, tuple[str, str]] = {
     "fake": ("lobstr_hw.drivers.fake", "FakeDriver"),
+    "flock": ("lobstr_hw.drivers.flock", "FlockDriver"),
     "openvr": ("lobstr_hw.drivers.openvr", "OpenVRDriver"),
     "polhemus": ("lobstr_hw.drivers.polhemus", "PolhemusDriver"),
     "replay": ("lobstr_hw.drivers.replay", "ReplayDriver"),

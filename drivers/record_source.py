@@ -1,6 +1,7 @@
 """A device that sends records over a line: bytes in, readings out."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Generic, Protocol, TypeVar
 
 from lobstr_hw.drivers.reading_thread import LinkLost, Reading
@@ -48,6 +49,7 @@ class RecordSource(Generic[Record]):
         self._link, self._length, self._parse, self._reading = link, length, parse, reading
         self._buffer = b""
         self._first: list[Reading] = []
+        self._stop: Sequence[bytes] = ()
 
     def start(self, stop: Sequence[bytes], go: Sequence[bytes]) -> bool:
         """Silence the device, set it up, and wait for its first record; False: none came.
@@ -55,6 +57,7 @@ class RecordSource(Generic[Record]):
         Raises:
             LinkLost: the line went meanwhile; it is closed.
         """
+        self._stop = stop
         try:
             for command in stop:
                 self._link.write(command)
@@ -83,5 +86,8 @@ class RecordSource(Generic[Record]):
         return [self._reading(record) for record in records]
 
     def close(self) -> None:
-        """Let go of the line; the device goes on sending to nobody, as it does after a crash."""
+        """Silence the device, if it is still there, and let go of the line."""
+        with suppress(LinkLost):
+            for command in self._stop:
+                self._link.write(command)
         self._link.close()

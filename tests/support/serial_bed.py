@@ -8,6 +8,7 @@ import threading
 from pathlib import Path
 
 from support.beds import need
+from support.waiting import wait_until
 
 __all__ = ["SerialDevice", "need_serial"]
 
@@ -60,6 +61,12 @@ class SerialDevice:
         with self._lock:
             os.write(self._master, data)
 
+    def settle(self) -> None:
+        """Come back when everything that was written has been obeyed."""
+        wait_until(lambda: not select.select([self._master], [], [], 0)[0], "the device has read")
+        with self._lock:
+            pass
+
     def power_on(self) -> None:
         """Forget what was set up."""
 
@@ -73,5 +80,5 @@ class SerialDevice:
             ready, _, _ = select.select([master, pipe], [], [])
             if pipe in ready:
                 return
-            with self._lock:
+            with self._lock:  # taken before reading: an empty line then means that all is obeyed
                 rest = self.obey(rest + os.read(master, 4096))
