@@ -1,26 +1,18 @@
-"""The status line on the terminal: drawn by a thread of its own, a few times a second.
+"""The status line of a live session."""
 
-The loop only leaves a snapshot behind; drawing costs about 3 ms of the interpreter's time each.
-"""
-
-import sys
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self
 
-from rich.console import Console, Group, RenderableType
-from rich.live import Live
+from rich.console import Group, RenderableType
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from lobstr_hw.runtime.live_line import LiveLine
 from lobstr_hw.skeleton_pose import SkeletonPose, Source
 
 __all__ = ["Snapshot", "StatusLine", "render"]
 
-REFRESH_S = 0.25
 COLOURS = {"ok": "green", "guessed": "yellow", "missing": "red"}
 
 
@@ -104,7 +96,7 @@ def _trouble(now: Snapshot) -> Text:
     return Text("  ".join(f"{word} {n}" for word, n in counts.items() if n), "yellow")
 
 
-class StatusLine:
+class StatusLine(LiveLine[Snapshot]):
     """Draws the newest snapshot until it is left; draws nothing where stderr is no terminal."""
 
     def __init__(self, snapshot: Callable[[], Snapshot | None], quiet: bool = False) -> None:
@@ -114,36 +106,4 @@ class StatusLine:
             snapshot: gives the newest; called from another thread.
             quiet: draw nothing.
         """
-        self._snapshot = snapshot
-        self._quiet = quiet or not sys.stderr.isatty()
-        self._end = threading.Event()
-        self._thread = threading.Thread(target=self._draw, name="status", daemon=True)
-
-    def __enter__(self) -> Self:
-        """Begin to draw."""
-        if not self._quiet:
-            self._thread.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Draw once more, and stop."""
-        self._end.set()
-        if self._thread.is_alive():
-            self._thread.join()
-
-    def _draw(self) -> None:
-        before: Snapshot | None = None
-        with Live(console=Console(stderr=True), auto_refresh=False) as live:
-            while True:
-                ended = self._end.wait(REFRESH_S)
-                now = self._snapshot()
-                if now is not None:
-                    live.update(render(now, before), refresh=True)
-                    before = now
-                if ended:
-                    return
+        super().__init__(snapshot, render, quiet)
