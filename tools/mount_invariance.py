@@ -171,7 +171,7 @@ def _first_seconds(motion: Motion) -> Motion:
 
 
 def _head(args: argparse.Namespace, motions: Sequence[Motion]) -> str:
-    clips = " ".join("/".join(path.parts[-2:]) for path in args.clips)
+    clips = " ".join("/".join(path.parts[-3:]) for path in args.clips)
     command = f"python tools/mount_invariance.py --users {args.users} --seed {args.seed} {clips}"
     date = datetime.datetime.now(tz=datetime.UTC).date()
     seconds = sum(motion.duration_s for motion in motions)

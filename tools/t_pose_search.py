@@ -58,6 +58,7 @@ def _calibration_table() -> ModuleType:
 def _report(table: ModuleType, folders: Sequence[Path]) -> list[str]:
     rows = ["| set | pieces | minutes | finds | of these T-poses |", "|---|---|---|---|---|"]
     cases: list[object] = []
+    off_deg: list[float] = []
     for folder in folders:
         seconds, finds, true = 0.0, 0, 0
         motions = [m for m in retarget(find_clips([folder])) if m.duration_s >= 2.0]
@@ -69,7 +70,8 @@ def _report(table: ModuleType, folders: Sequence[Path]) -> list[str]:
             if pose is None:
                 continue
             finds += 1
-            if _arms_off_deg(take, pose) < STRAIGHT_OUT_DEG:
+            off_deg.append(_arms_off_deg(take, pose))
+            if off_deg[-1] < STRAIGHT_OUT_DEG:
                 true += 1
                 cases += list(_users(table, motion, i))
         rows.append(
@@ -79,7 +81,10 @@ def _report(table: ModuleType, folders: Sequence[Path]) -> list[str]:
     return [
         *rows,
         "",
-        f"What these T-poses calibrate to, each worn by {USERS} users ({len(cases)} cases):",
+        f"The worse arm of a find is {np.median(off_deg):.0f} degrees off straight in the median and "
+        f"{np.max(off_deg):.0f} at most. What these T-poses calibrate to, each worn by {USERS} users "
+        f"({len(cases)} cases; the performers held no controllers, so the turn of their hands about "
+        "the arm says little about people who do):",
         "",
         *table.offsets_table(cases),
         "",
