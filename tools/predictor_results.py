@@ -1,0 +1,165 @@
+"""The section "The predictor" of docs/results.md, measured.
+
+python tools/predictor_results.py DATA OUT [--weights FILE.onnx] [--write docs/results.md]
+
+DATA is the folder with one folder per set. Documents of lobstr-evaluate's kind go to OUT; one that
+is there is not made again. With --write the section is put into the page, else it is printed.
+"""
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from lobstr_hw.evaluation.evaluate import evaluate
+from lobstr_hw.evaluation.rollout import Mode
+from lobstr_hw.evaluation.tables import document, markdown_table
+from lobstr_hw.evaluation.truth import Truth
+from lobstr_hw.predictors import SHIPPED_WEIGHTS, Predictor, load_predictor
+from lobstr_hw.predictors.trivial import mean_pose, standing
+from lobstr_hw.predictors.weights import read_card
+from lobstr_hw.retargeting import find_clips, retarget
+from lobstr_hw.splits import clip_name, default_split
+
+PARTS = {
+    "test": "People nobody trained on",
+    "test_same_actor": "Held-out clips of the training actors",
+}
+ROWS = {
+    "carried": "the network, carried (ships)",
+    "windowed": "the same network, windowed",
+    "mean_pose": "mean pose of the training data",
+    "standing": "constant standing pose",
+}
+PAPER = """The paper's Table 1, **measured on other data** (its own split of PFNN, MHAD and CMU, its
+own skeleton, contact by 1 cm):
+
+| | contact % | rotation ° | toes cm |
+|---|---|---|---|
+| FC-6 | 84.22 | 9.37 | 7.2 |
+| CNN-1D | 72.33 | 13.86 | 13.3 |
+| RNN | 82.27 | 9.43 | 7.1 |
+| LSTM | 83.85 | 8.50 | 6.63 |
+| GRU (the paper's) | 85.77 | 8.53 | 6.63 |
+"""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("data", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--weights", type=Path, default=SHIPPED_WEIGHTS)
+    parser.add_argument("--write", type=Path)
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    for part in PARTS:
+        _measure(options, part)
+    section = _section(options)
+    if options.write:
+        _replace(options.write, section)
+    else:
+        print(section)
+
+
+def _measure(options: argparse.Namespace, part: str) -> None:
+    missing = [row for row in ROWS if not _path(options.out, part, row).is_file()]
+    if not missing:
+        return
+    clips = list(_truths(options.data, part))
+    for row in missing:
+        mode: Mode = "windowed" if row == "windowed" else "carried"
+        print(f"{part}: {row}", file=sys.stderr, flush=True)
+        results = evaluate(_predictor(options.weights, row), clips, mode)
+        text = json.dumps(document(results), indent=1)
+        _path(options.out, part, row).write_text(text + "\n", encoding="utf-8")
+
+
+def _path(out: Path, part: str, row: str) -> Path:
+    return out / f"{part}-{row}.json"
+
+
+def _truths(data: Path, part: str) -> Iterator[Truth]:
+    """As lobstr-evaluate has them."""
+    found = find_clips([data])
+    wanted = default_split().parts[part]
+    sets = {name.split("/")[0] for name in wanted}
+    for motion in retarget([clip for clip in found if clip.set_name in sets]):
+        if clip_name(motion.name) in wanted:
+            yield Truth.of(motion)
+
+
+def _predictor(weights: Path, row: str) -> Predictor:
+    if row == "standing":
+        return standing()
+    if row == "mean_pose":
+        return mean_pose(read_card(weights.with_suffix(".json")))
+    return load_predictor(str(weights))
+
+
+def _section(options: argparse.Namespace) -> str:
+    card = read_card(options.weights.with_suffix(".json")).model
+    parts = [_recipe(card.details)]
+    for part, title in PARTS.items():
+        trees = {row: _read(options.out, part, row) for row in ROWS}
+        frames = trees["carried"]["all"]["network"]["frames"]
+        minutes = (
+            f"{frames / 45.0 / 60.0:.1f} minutes scored, {len(trees['carried']['clips'])} clips"
+        )
+        parts.append(f"### {title} (`{part}`, {minutes})\n\n{_table(trees)}\n")
+        parts.append(f"By set, carried:\n\n{_by_set(trees['carried'])}\n")
+    return "## The predictor\n\n" + "\n".join(parts) + "\n" + PAPER
+
+
+def _read(out: Path, part: str, row: str) -> dict[str, Any]:
+    tree: dict[str, Any] = json.loads(_path(out, part, row).read_text(encoding="utf-8"))
+    return tree
+
+
+def _recipe(details: dict[str, Any]) -> str:
+    config, data = details["configuration"], details["data"]
+    minutes = data["minutes_by_set"]
+    sets = ", ".join(f"{name} {value}" for name, value in minutes.items())
+    return (
+        f"`lobstr-train DATA --out RUN --seed {config['seed']} --precision {config['precision']}`: "
+        f"the paper's recipe, {details['architecture']} ({details['parameters']:,} parameters), "
+        f"{details['steps_done']} steps of {config['batch']} windows of {config['window']} frames, "
+        f"loss on the last frame, drifting tracker errors, seed {config['seed']}, products in "
+        f"{config['precision']}, {details['wall_s'] / 60.0:.0f} minutes on one thread of a shared "
+        f"two-core machine. Split `{data['split']}` (`lobstr_hw/training/splits`), "
+        f"{data['clips']} clips or pieces of clips, {sum(minutes.values()):.0f} minutes before "
+        f"mirroring ({sets}). The step that ships is the last one; nothing was chosen on a test "
+        "part.\n\nScored by `python tools/predictor_results.py DATA OUT` (the same figures as "
+        "`lobstr-evaluate DATA --part PART [--mode windowed] [--predictor NAME]`): trackers from "
+        "the truth without noise, the true root, lengths on the 1.0 m skeleton. `network` is FK of "
+        "what was predicted, `after IK` the shown body with contact lock and floor; contact after "
+        "IK is the lock.\n"
+    )
+
+
+def _table(trees: dict[str, dict[str, Any]]) -> str:
+    rows = []
+    for row, label in ROWS.items():
+        rows.append((f"{label}: network", trees[row]["all"]["network"]))
+        rows.append((f"{label}: after IK", trees[row]["all"]["after_ik"]))
+    return markdown_table(rows)
+
+
+def _by_set(tree: dict[str, Any]) -> str:
+    rows = []
+    for folder, pair in tree["folders"].items():
+        rows.append((f"{folder}: network", pair["network"]))
+        rows.append((f"{folder}: after IK", pair["after_ik"]))
+    return markdown_table(rows)
+
+
+def _replace(page: Path, section: str) -> None:
+    text = page.read_text(encoding="utf-8") if page.is_file() else "# Results\n"
+    rest = re.sub(r"^## The predictor\n.*?(?=^## |\Z)", "", text, flags=re.DOTALL | re.MULTILINE)
+    page.write_text(rest.rstrip() + "\n\n" + section, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
