@@ -103,7 +103,12 @@ class TPose:
 
 
 class TPoseDetector:
-    """Finds a still T-pose in a stream of samples."""
+    """Finds a still T-pose in a stream of samples.
+
+    Attributes:
+        best: quality of the moment that came closest; None while trackers are missing.
+        latest: quality at the last look; None while trackers are missing.
+    """
 
     def __init__(
         self,
@@ -124,6 +129,7 @@ class TPoseDetector:
         """
         self.hints: dict[str, TrackerRole] = dict(hints or {})
         self.best: TPoseQuality | None = None
+        self.latest: TPoseQuality | None = None
         self._window = Window(hold_s)
         self._every_s = every_s
         self._floor_m = floor_m
@@ -166,6 +172,7 @@ class TPoseDetector:
                 self.hints,
             )
         except MissingRole:
+            self.latest = None
             return None
         order = [list(seen)[chosen[role]] for role in FOUR_POINTS]
         return self._judge(order, [seen[serial] for serial in order])
@@ -175,7 +182,7 @@ class TPoseDetector:
         R = np.array([rest.R for rest in rests])
         spread_m = max(rest.spread_m for rest in rests)
         spread_rad = max(rest.spread_rad for rest in rests)
-        quality = TPoseQuality(_checks(p, R, spread_m, spread_rad))
+        quality = self.latest = TPoseQuality(_checks(p, R, spread_m, spread_rad))
         if self.best is None or quality.shortfall < self.best.shortfall:
             self.best = quality
         if not quality.ok:
