@@ -81,10 +81,10 @@ def _report(table: ModuleType, folders: Sequence[Path]) -> list[str]:
     return [
         *rows,
         "",
-        f"The worse arm of a find is {np.median(off_deg):.0f} degrees off straight in the median and "
-        f"{np.max(off_deg):.0f} at most. What these T-poses calibrate to, each worn by {USERS} users "
-        f"({len(cases)} cases; the performers held no controllers, so the turn of their hands about "
-        "the arm says little about people who do):",
+        f"The worse arm of a find is {np.median(off_deg):.0f} degrees off straight in the median, "
+        f"{np.max(off_deg):.0f} at most. What these T-poses calibrate to, each worn by {USERS} "
+        f"users ({len(cases)} cases; the performers held no controllers, so the turn of their "
+        "hands about the arm says little about people who do):",
         "",
         *table.offsets_table(cases),
         "",
