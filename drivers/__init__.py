@@ -17,6 +17,7 @@ DRIVERS: Mapping[str, tuple[str, str]] = {
     "fake": ("lobstr_hw.drivers.fake", "FakeDriver"),
     "flock": ("lobstr_hw.drivers.flock", "FlockDriver"),
     "openvr": ("lobstr_hw.drivers.openvr", "OpenVRDriver"),
+    "openxr": ("lobstr_hw.drivers.openxr", "OpenXRDriver"),
     "polhemus": ("lobstr_hw.drivers.polhemus", "PolhemusDriver"),
     "replay": ("lobstr_hw.drivers.replay", "ReplayDriver"),
     "vmc": ("lobstr_hw.drivers.vmc", "VmcDriver"),

@@ -4,8 +4,9 @@ import ctypes
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from lobstr_hw.drivers.chosen_roles import hint
 from lobstr_hw.drivers.driver import DeviceInfo
-from lobstr_hw.drivers.openvr.roles import HEADSET, Facts, device_kind, role_hint
+from lobstr_hw.drivers.openvr.roles import HEADSET, Facts, device_kind, said_role
 from lobstr_hw.trackers import TrackerRole
 
 __all__ = ["DeviceReader"]
@@ -40,7 +41,7 @@ class DeviceReader:
             facts.serial,
             device_kind(facts),
             model=self._text(index, self._openvr.Prop_ModelNumber_String),
-            role_hint=role_hint(facts, self._chosen),
+            role_hint=hint(facts.serial, said_role(facts), self._chosen),
             firmware=self._text(index, self._openvr.Prop_TrackingFirmwareVersion_String),
             battery=self._battery(index),
             worn=self._worn(index) if facts.device_class == HEADSET else None,

@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lobstr_hw.drivers.chosen_roles import ROLE_OPTIONS, by_serial
 from lobstr_hw.drivers.driver import DeviceEvent, DeviceInfo, EventKind, Probe, TrackerDriver
 from lobstr_hw.drivers.openvr.buttons import button_name
 from lobstr_hw.drivers.openvr.devices import DeviceReader
@@ -13,7 +14,7 @@ from lobstr_hw.drivers.openvr.readings import NOWHERE, records, sample_of
 from lobstr_hw.drivers.vendor import probe_library, require_library
 from lobstr_hw.errors import DriverUnavailable
 from lobstr_hw.poses import PartialPose
-from lobstr_hw.trackers import TrackerRole, TrackerSample
+from lobstr_hw.trackers import TrackerSample
 
 __all__ = ["OpenVRDriver"]
 
@@ -38,12 +39,12 @@ class OpenVRDriver(TrackerDriver):
     devices are gone, and the driver has to be opened again.
     """
 
-    options: ClassVar = {role.value: str for role in TrackerRole}
+    options: ClassVar = ROLE_OPTIONS
     """A serial per role, as in ``openvr:pelvis=LHR-1A2B3C4D``; goes before what SteamVR says."""
 
     def __init__(self, **serials: str) -> None:
         """Remember which serials stand for which roles; nothing is loaded yet."""
-        self._chosen = {serial: TrackerRole(role) for role, serial in serials.items()}
+        self._chosen = by_serial(serials)
         self._openvr: Any = None
         self._system: Any = None
         self._forget()

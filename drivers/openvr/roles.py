@@ -1,11 +1,10 @@
 """What SteamVR's words for roles mean here."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from lobstr_hw.trackers import TrackerRole
 
-__all__ = ["HEADSET", "Facts", "device_kind", "role_hint"]
+__all__ = ["HEADSET", "Facts", "device_kind", "said_role"]
 
 HEADSET, CONTROLLER, TRACKER, BASE_STATION = 1, 2, 3, 4
 """SteamVR's device classes that matter here."""
@@ -59,20 +58,8 @@ def device_kind(facts: Facts) -> str:
     return KINDS.get(facts.device_class, "")
 
 
-def role_hint(facts: Facts, chosen: Mapping[str, TrackerRole]) -> TrackerRole | None:
-    """What a device stands for: by the serial chosen, the user's setting, then its type.
-
-    Args:
-        facts: of the device.
-        chosen: serial -> role as the user named them; such a role is nobody else's.
-    """
-    if facts.serial in chosen:
-        return chosen[facts.serial]
-    hint = _said_by_steamvr(facts)
-    return None if hint in chosen.values() else hint
-
-
-def _said_by_steamvr(facts: Facts) -> TrackerRole | None:
+def said_role(facts: Facts) -> TrackerRole | None:
+    """What SteamVR says a device stands for: by the user's setting, else by its type."""
     if facts.device_class == HEADSET:
         return TrackerRole.HEAD
     if facts.device_class == CONTROLLER:

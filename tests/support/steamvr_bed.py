@@ -6,7 +6,6 @@ The structs are those of the C file, word for word.
 import ctypes
 import json
 import mmap
-import os
 import shutil
 import subprocess
 import sys
@@ -16,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-from support.beds import need
+from support.beds import environment, need
 
 from lobstr_hw.rotations import Array
 
@@ -154,16 +153,5 @@ def running_steamvr(registry: Path, stage_file: Path) -> Iterator[SteamVR]:
     stage_file.write_bytes(bytes(ctypes.sizeof(Stage)))
     with stage_file.open("r+b") as file:
         stage = Stage.from_buffer(mmap.mmap(file.fileno(), 0))  # unmapped with its last user
-    with _environment(VR_PATHREG_OVERRIDE=registry, FAKE_STEAMVR_STAGE=stage_file):
+    with environment(VR_PATHREG_OVERRIDE=str(registry), FAKE_STEAMVR_STAGE=str(stage_file)):
         yield SteamVR(stage)
-
-
-@contextmanager
-def _environment(**paths: Path) -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in paths}
-    os.environ.update({name: str(path) for name, path in paths.items()})
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            os.environ.pop(name) if value is None else os.environ.update({name: value})
