@@ -27,6 +27,7 @@ from lobstr_hw.drivers.flock_records import (
     setup_commands,
 )
 from lobstr_hw.drivers.magnetic import METRES_PER_INCH, signed_axis, source_axes, world_pose
+from lobstr_hw.drivers.options import yes_no
 from lobstr_hw.drivers.reading_thread import Reading
 from lobstr_hw.drivers.record_source import RecordSource
 from lobstr_hw.drivers.serial_stream import SerialLink
@@ -34,7 +35,7 @@ from lobstr_hw.drivers.stream import StreamDriver
 from lobstr_hw.drivers.vendor import probe_library
 from lobstr_hw.errors import TrackerNotFound
 
-__all__ = ["FlockDriver", "yes_no"]
+__all__ = ["FlockDriver"]
 
 CONFIGURING_S = 0.3
 """For so long the flock is deaf, before and after it was told how many units it has."""
@@ -42,17 +43,6 @@ RESET_S = (1.0, 2.0)
 """RTS high, then low."""
 STATUS_READS = 200
 """Ten seconds: a flock that is starting answers no sooner."""
-
-
-def yes_no(text: str) -> bool:
-    """``yes`` or ``no``.
-
-    Raises:
-        ValueError: anything else.
-    """
-    if text not in ("yes", "no"):
-        raise ValueError(f"{text!r} is neither yes nor no")
-    return text == "yes"
 
 
 class FlockDriver(StreamDriver):
