@@ -15,13 +15,21 @@ from lobstr_hw.rotations import (
     transpose,
 )
 
-__all__ = ["hands_heading", "head_mount", "headset_heading", "pose_heading", "turn_between"]
+__all__ = [
+    "HANDS_DEVIATION",
+    "STRANGE",
+    "hands_heading",
+    "head_mount",
+    "headset_heading",
+    "pose_heading",
+    "turn_between",
+]
 
-_HANDS_DEVIATION = np.deg2rad(2.6)
+HANDS_DEVIATION = np.deg2rad(2.6)
 """Two arms off by 3.5 degrees and two wands 4 cm across, 1.55 m apart."""
 _HEADSET_DEVIATION = float(np.hypot(HEADSET_DEVIATION[1], POSE_DEVIATION))
-_HEADING_DEVIATION = 1.0 / np.hypot(1.0 / _HANDS_DEVIATION, 1.0 / _HEADSET_DEVIATION)
-_STRANGE = np.deg2rad(35.0)
+_HEADING_DEVIATION = 1.0 / np.hypot(1.0 / HANDS_DEVIATION, 1.0 / _HEADSET_DEVIATION)
+STRANGE = np.deg2rad(35.0)
 """Beyond this a headset's frame is not the one that the prior speaks of."""
 
 
@@ -49,7 +57,7 @@ def pose_heading(p_left: Array, p_right: Array, R_headset: Array) -> tuple[float
     """
     hands = float(hands_heading(p_left, p_right))
     disagreement = float(turn_between(headset_heading(R_headset), hands))
-    if abs(disagreement) > _STRANGE:
+    if abs(disagreement) > STRANGE:
         return hands, disagreement
     weight = (_HEADING_DEVIATION / _HEADSET_DEVIATION) ** 2
     return float(turn_between(hands + weight * disagreement, 0.0)), disagreement
@@ -72,7 +80,7 @@ def head_mount(R_seen: Array) -> tuple[Array, Array]:
     held = np.full(3, POSE_DEVIATION)
     held[1] = np.hypot(held[1], _HEADING_DEVIATION)
     share = HEADSET_DEVIATION**2 / (HEADSET_DEVIATION**2 + held**2)
-    if np.linalg.norm(off) > _STRANGE:
+    if np.linalg.norm(off) > STRANGE:
         share = np.ones(3)
     R_head_tracker = from_rotation_vector(share * off) @ IDEAL_DEVICE
     return R_seen @ transpose(R_head_tracker), R_head_tracker

@@ -35,7 +35,7 @@ from lobstr_hw.proportions import (
 from lobstr_hw.rotations import Array
 from lobstr_hw.skeleton import STANDARD_OFFSETS, STATURE, Body, Joint
 
-__all__ = ["Measures", "fit_measures"]
+__all__ = ["LeverPrior", "Measures", "fit_measures"]
 
 STEPS = 8
 _FREE_M = 100.0  # no opinion
@@ -66,7 +66,7 @@ class Measures:
 
     Attributes:
         stature_m, hips_height_m, trunk_m, arm_m, shoulders_m: see ``body_from_measures``.
-        levers: (4, 3) from joint to tracker in the T-pose, in the person's heading; FOUR_POINTS.
+        levers: (4, 3) from joint to tracker, in the joint's frame; FOUR_POINTS.
         hips_height_deviation_m: how far off the hips' height may be.
         arm_deviation_m: how far off the arms may be.
         misfit: root mean square of all residuals over their deviations; above 2 something is odd.
@@ -92,6 +92,31 @@ class Measures:
         return body_from_measures(*(np.array([part]) for part in parts))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class LeverPrior:
+    """What is known beforehand about where trackers sit, and how their joints are held.
+
+    Attributes:
+        held: (4, 3, 3) joints in the T-pose, in the person's heading; FOUR_POINTS.
+        mean: (4, 3) from joint to tracker, in the joint's frame; the headset's from the eyes.
+        deviation: (4, 3) of these.
+    """
+
+    held: Array
+    mean: Array
+    deviation: Array
+
+    @staticmethod
+    def usual(R_head: Array) -> "LeverPrior":
+        """Of people in general; all but the head held straight."""
+        held = np.stack([R_head, *np.broadcast_to(np.eye(3), (3, 3, 3))])
+        mean = np.stack([np.zeros(3), WAND_LEVER, WAND_LEVER * _MIRROR, BELLY_LEVER])
+        deviation = np.stack(
+            [EYES_DEVIATION, WAND_LEVER_DEVIATION, WAND_LEVER_DEVIATION, BELLY_LEVER_DEVIATION]
+        )
+        return LeverPrior(held, mean, deviation)
+
+
 # the unknowns, in this order, each as its distance from the mean in deviations
 _SIZES = slice(0, 4)  # stature (metres), leg, arm, shoulders (fractions)
 _PLACE = slice(4, 6)  # of the hips on the floor
@@ -100,7 +125,12 @@ _ARMS = slice(8, 12)  # left up, left forward, right up, right forward
 _LEVERS = slice(12, 24)
 
 
-def fit_measures(p: Array, R_head: Array, stature_m: float | None = None) -> Measures:
+def fit_measures(
+    p: Array,
+    R_head: Array,
+    stature_m: float | None = None,
+    levers: LeverPrior | None = None,
+) -> Measures:
     """Measure a person in a T-pose.
 
     Args:
@@ -108,18 +138,21 @@ def fit_measures(p: Array, R_head: Array, stature_m: float | None = None) -> Mea
             floor.
         R_head: (3, 3) how the head is held, in the person's heading.
         stature_m: where the person knows it.
+        levers: where more is known about the trackers than of people in general; R_head is then
+            not looked at.
     """
-    mean, deviation = _prior(p, stature_m)
+    levers = LeverPrior.usual(R_head) if levers is None else levers
+    mean, deviation = _prior(p, stature_m, levers)
     weight = np.repeat(1.0 / _MEASURED_M, 3)
     u = np.zeros(len(mean))
     for _ in range(STEPS):
-        at, J = _linearized(u, mean, deviation, R_head)
+        at, J = _linearized(u, mean, deviation, levers.held)
         J = J * weight[:, None]
         residual = weight * (p.ravel() - at) + J @ u
         spread = np.linalg.inv(J.T @ J + np.eye(len(u)))
         u = spread @ (J.T @ residual)
     found = mean + deviation * u
-    left = weight * (p.ravel() - _trackers(found, R_head).ravel())
+    left = weight * (p.ravel() - _trackers(found, levers.held).ravel())
     informed = deviation < _FREE_M
     return _measures(
         found,
@@ -128,14 +161,13 @@ def fit_measures(p: Array, R_head: Array, stature_m: float | None = None) -> Mea
     )
 
 
-def _prior(p: Array, stature_m: float | None) -> tuple[Array, Array]:
+def _prior(p: Array, stature_m: float | None, levers: LeverPrior) -> tuple[Array, Array]:
     """Mean and deviation (24,) of the unknowns; the stature's and the place's are only starts."""
     stature = p[0, 1] / EYES_OF_STATURE if stature_m is None else stature_m
     mean = np.zeros(24)
     mean[0] = stature
-    mean[_PLACE] = (p[3] - BELLY_LEVER)[[0, 2]]
-    levers = [np.zeros(3), WAND_LEVER, WAND_LEVER * _MIRROR, BELLY_LEVER]
-    mean[_LEVERS] = np.concatenate(levers)  # the headset's is counted from the eyes
+    mean[_PLACE] = (p[3] - levers.held[3] @ levers.mean[3])[[0, 2]]
+    mean[_LEVERS] = levers.mean.ravel()
     sizes = [
         _FREE_M if stature_m is None else _GIVEN_M,
         LEG_DEVIATION,
@@ -148,22 +180,19 @@ def _prior(p: Array, stature_m: float | None) -> tuple[Array, Array]:
             np.full(2, _FREE_M),
             np.full(2, TRUNK_DEVIATION),
             np.tile(ARM_LIFT_DEVIATIONS, 2),
-            EYES_DEVIATION,
-            WAND_LEVER_DEVIATION,
-            WAND_LEVER_DEVIATION,
-            BELLY_LEVER_DEVIATION,
+            levers.deviation.ravel(),
         ]
     )
     return mean, deviation
 
 
-def _linearized(u: Array, mean: Array, deviation: Array, R_head: Array) -> tuple[Array, Array]:
+def _linearized(u: Array, mean: Array, deviation: Array, held: Array) -> tuple[Array, Array]:
     """The twelve coordinates at u and their derivatives (12, 24), by central differences."""
     step_m = 1e-6 / np.minimum(deviation, 1.0)  # a micrometre (or microradian) of each unknown
     around = u + np.concatenate([np.diag(step_m), -np.diag(step_m)])
-    values = _trackers(mean + deviation * around, R_head).reshape(len(around), -1)
+    values = _trackers(mean + deviation * around, held).reshape(len(around), -1)
     plus, minus = np.split(values, 2)
-    at = _trackers(mean + deviation * u, R_head).ravel()
+    at = _trackers(mean + deviation * u, held).ravel()
     return at, ((plus - minus) / (2.0 * step_m[:, None])).T
 
 
@@ -176,16 +205,16 @@ def _sizes(x: Array) -> tuple[Array, Array, Array, Array]:
     return hips, trunk, STANDARD_ARM * size * (1.0 + arm), STANDARD_WIDTH * size * (1.0 + shoulders)
 
 
-def _trackers(x: Array, R_head: Array) -> Array:
-    """Where the four trackers (..., 4, 3) are for unknowns x (..., 24)."""
+def _trackers(x: Array, held: Array) -> Array:
+    """Where the four trackers (..., 4, 3) are for unknowns x (..., 24), joints held so."""
     hips_height, trunk, arm, shoulders = _sizes(x)
     hips = np.stack([x[..., 4], hips_height, x[..., 5]], axis=-1)
     forward, left = np.moveaxis(x[..., _LEAN], -1, 0)
     up = np.stack([left, np.sqrt(1.0 - forward**2 - left**2), forward], axis=-1)
-    levers = x[..., _LEVERS].reshape(*x.shape[:-1], 4, 3)
-    head = hips + trunk[..., None] * up
-    eyes = (R_head @ (eyes_in_head(x[..., 0]) + levers[..., 0, :])[..., None])[..., 0]
-    joints = [head + eyes]
+    levers = np.array(x[..., _LEVERS]).reshape(*x.shape[:-1], 4, 3)
+    levers[..., 0, :] += eyes_in_head(x[..., 0])
+    levers = (held @ levers[..., None])[..., 0]
+    joints = [hips + trunk[..., None] * up + levers[..., 0, :]]
     for i, side in enumerate((1.0, -1.0)):
         lift, ahead = x[..., 8 + 2 * i], x[..., 9 + 2 * i]
         out = np.stack([side * np.sqrt(1.0 - lift**2 - ahead**2), lift, ahead], axis=-1)
