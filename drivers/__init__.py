@@ -20,6 +20,7 @@ DRIVERS: Mapping[str, tuple[str, str]] = {
     "openxr": ("lobstr_hw.drivers.openxr", "OpenXRDriver"),
     "polhemus": ("lobstr_hw.drivers.polhemus", "PolhemusDriver"),
     "replay": ("lobstr_hw.drivers.replay", "ReplayDriver"),
+    "sample": ("lobstr_hw.drivers.sample", "SampleDriver"),
     "ultimate": ("lobstr_hw.drivers.ultimate", "UltimateDriver"),
     "vmc": ("lobstr_hw.drivers.vmc", "VmcDriver"),
 }

@@ -8,11 +8,8 @@ preferred where a sender has both) and ``/VMC/Ext/Set/Calib/*``; every other add
 The sender's clock, ``/VMC/Ext/T``, counts where it is in the same datagram as the poses.
 """
 
-import errno
 import math
-import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar
@@ -23,7 +20,7 @@ from lobstr_hw.drivers.driver import DeviceInfo, Probe
 from lobstr_hw.drivers.osc import OscMessage, read_packet
 from lobstr_hw.drivers.reading_thread import Arrival, Command, Reading
 from lobstr_hw.drivers.stream import StreamDriver
-from lobstr_hw.errors import DeviceBusy, DriverError, DriverUnavailable
+from lobstr_hw.drivers.udp_port import UdpPort
 from lobstr_hw.poses import PartialPose
 from lobstr_hw.rotations import from_quat_xyzw
 from lobstr_hw.trackers import TrackerRole
@@ -32,8 +29,6 @@ __all__ = ["Space", "VmcDriver", "VmcPose", "device_time_s", "pose_from_unity", 
 
 PORT = 39540
 """Where a VMC "performer" listens for the devices of an assistant."""
-READ_S = 0.05
-DATAGRAM = 65535
 MOST_TRACKERS = 64
 """Serials come from the network: a sender that makes up new ones must not fill the memory."""
 LONGEST_SERIAL = 64
@@ -156,11 +151,11 @@ class VmcDriver(StreamDriver):
         """Listening needs nothing but a free port."""
         return Probe(available=True)
 
-    def _connect(self) -> "_Socket":
+    def _connect(self) -> "_Sender":
         self._kinds, self._local = {}, set()
-        return _Socket(self._bind, self._port, self._readings)
+        return _Sender(UdpPort(self._bind, self._port), self._arrivals)
 
-    def _readings(self, data: bytes) -> Iterator[Arrival]:
+    def _arrivals(self, data: bytes) -> Iterator[Arrival]:
         """What one datagram says."""
         messages = read_packet(data)
         device_s = device_time_s(messages)
@@ -199,35 +194,14 @@ class VmcDriver(StreamDriver):
         return TrackerRole.PELVIS if is_pelvis else None
 
 
-class _Socket:
-    """An open UDP port."""
+class _Sender:
+    """Whoever sends to an open port."""
 
-    def __init__(self, bind: str, port: int, readings: Callable[[bytes], Iterator[Arrival]]):
-        self._readings = readings
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.settimeout(READ_S)
-        try:
-            self._socket.bind((bind, port))
-        except OSError as error:
-            self._socket.close()
-            raise _translated(bind, port, error) from error
+    def __init__(self, port: UdpPort, arrivals: Callable[[bytes], Iterator[Arrival]]) -> None:
+        self._port, self._arrivals = port, arrivals
 
     def read(self) -> Sequence[Arrival]:
-        """One datagram's."""
-        try:
-            return list(self._readings(self._socket.recv(DATAGRAM)))
-        except TimeoutError:
-            return ()
+        return list(self._arrivals(self._port.read()))
 
     def close(self) -> None:
-        """Free the port."""
-        with suppress(OSError):
-            self._socket.close()
-
-
-def _translated(bind: str, port: int, error: OSError) -> DriverError:
-    if error.errno in (errno.EADDRINUSE, getattr(errno, "WSAEADDRINUSE", errno.EADDRINUSE)):
-        return DeviceBusy(f"UDP port {port} is in use by another program: close it, or use port=")
-    return DriverUnavailable(
-        f"cannot listen on {bind}:{port} ({error}): bind= must be an address of this machine"
-    )
+        self._port.close()

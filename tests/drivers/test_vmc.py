@@ -208,8 +208,8 @@ def test_another_app_can_ask_for_the_calibration(bed: VmcBed) -> None:
 def test_datagrams_of_anything_do_no_harm(datagrams: list[bytes]) -> None:
     driver = VmcDriver()
     for data in datagrams:
-        list(driver._readings(data))
-        list(driver._readings(bundle(data, packed("/VMC/Ext/Hmd/Pos", "H", *[math.nan] * 7))))
+        list(driver._arrivals(data))
+        list(driver._arrivals(bundle(data, packed("/VMC/Ext/Hmd/Pos", "H", *[math.nan] * 7))))
     assert not driver.devices()
 
 
@@ -229,7 +229,7 @@ def test_other_addresses_and_noise_on_the_socket_are_ignored(bed: VmcBed) -> Non
 def test_a_sender_that_makes_up_serials_fills_no_memory(bed: VmcBed) -> None:
     driver = VmcDriver()
     for number in range(1000):
-        list(driver._readings(packed("/VMC/Ext/Tra/Pos", f"S{number}", 0, 0, 0, 0, 0, 0, 1)))
+        list(driver._arrivals(packed("/VMC/Ext/Tra/Pos", f"S{number}", 0, 0, 0, 0, 0, 0, 1)))
     assert len(driver._kinds) == 64
 
 
