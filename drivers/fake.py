@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from lobstr_hw.drivers.driver import DeviceEvent, DeviceInfo, Probe, TrackerDriver
+from lobstr_hw.drivers.fake_script import SCRIPTS
 from lobstr_hw.poses import PartialPose
 from lobstr_hw.rotations import Array, rotation_x, rotation_y, rotation_z
 from lobstr_hw.skeleton import EYES, GRIP, Body, Joint, forward_kinematics
@@ -36,27 +37,51 @@ JITTER_M = 1e-4
 class FakeDriver(TrackerDriver):
     """Someone who stands in a T-pose for 4 s, lowers the arms, then sways for ever.
 
-    The same seed gives the same samples, however it is polled.
+    The same seed gives the same samples, however it is polled. With a script the person does
+    something else instead, and presses buttons.
     """
 
-    options: ClassVar = {"seed": int, "rate_hz": float, "height_cm": float}
+    options: ClassVar = {
+        "seed": int,
+        "rate_hz": float,
+        "height_cm": float,
+        "script": str,
+        "named": int,
+        "battery": float,
+    }
     """What ``--driver fake:...`` understands, and how it is read."""
 
-    def __init__(self, seed: int = 0, rate_hz: float = 90.0, height_cm: float = 170.0) -> None:
+    def __init__(
+        self,
+        seed: int = 0,
+        rate_hz: float = 90.0,
+        height_cm: float = 170.0,
+        script: str = "",
+        named: int = 1,
+        battery: float = 1.0,
+    ) -> None:
         """Choose a person.
 
         Args:
             seed: of the trackers' jitter.
             rate_hz: samples per second and tracker.
             height_cm: stature.
+            script: name of a script (drivers/fake_script.py); empty for the plain person.
+            named: 0 keeps to itself what each device is, as trackers without roles do.
+            battery: of every device, 0 to 1.
         """
+        if script and script not in SCRIPTS:
+            raise ValueError(f"no script is called {script!r}; known: {', '.join(SCRIPTS)}")
         if rate_hz <= 0.0 or height_cm <= 0.0:
             raise ValueError(f"rate_hz and height_cm must be positive: {rate_hz}, {height_cm}")
         self._seed, self._rate_hz = seed, rate_hz
         self._body = Body.standard(1, height_cm / 170.6)
+        self._script = SCRIPTS.get(script)
+        self._named, self._battery = named != 0, battery
         self._next = 0
         self._random = np.random.default_rng(seed)
         self._is_open = False
+        self._told_s, self._now_s = -1.0, -1.0
 
     @classmethod
     def probe(cls) -> Probe:
@@ -66,19 +91,22 @@ class FakeDriver(TrackerDriver):
     def open(self) -> None:
         """Begin at time 0."""
         self._next, self._random = 0, np.random.default_rng(self._seed)
+        self._told_s, self._now_s = -1.0, -1.0
         self._is_open = True
 
     def poll(self, now_s: float) -> Sequence[TrackerSample]:
         """The samples at whole multiples of the period, up to now_s."""
         if not self._is_open:
             return ()
+        self._now_s = max(self._now_s, now_s)
         stop = int(np.floor(now_s * self._rate_hz + 1e-9)) + 1
         times = np.arange(self._next, stop) / self._rate_hz
         times = times[times <= now_s]
         self._next += len(times)
         if not len(times):
             return ()
-        p, R = _trackers(times, self._body)
+        joints = _joints if self._script is None else self._script.joints
+        p, R = _trackers(*joints(times, self._body), self._body)
         p = p + self._random.normal(scale=JITTER_M, size=p.shape)
         return [
             TrackerSample(SERIALS[role], PartialPose(R[i, k], p[i, k]), float(time_s), tracked=True)
@@ -90,23 +118,31 @@ class FakeDriver(TrackerDriver):
         """Headset, two controllers, one tracker."""
         if not self._is_open:
             return ()
+        if not self._named:
+            return [
+                DeviceInfo(SERIALS[role], "tracker", "fake", battery=self._battery)
+                for role in FOUR_POINTS
+            ]
         return [
-            DeviceInfo(SERIALS[role], KINDS[role], "fake", role, battery=1.0)
+            DeviceInfo(SERIALS[role], KINDS[role], "fake", role, battery=self._battery)
             for role in FOUR_POINTS
         ]
 
     def events(self) -> Sequence[DeviceEvent]:
-        """Nobody presses anything."""
-        return ()
+        """Buttons that the script presses; otherwise nobody presses anything."""
+        if self._script is None or not self._is_open:
+            return ()
+        events = self._script.events(self._told_s, self._now_s, SERIALS)
+        self._told_s = self._now_s
+        return events
 
     def close(self) -> None:
         """Stop giving samples; twice is harmless."""
         self._is_open = False
 
 
-def _trackers(times_s: Array, body: Body) -> tuple[Array, Array]:
+def _trackers(p: Array, R: Array, body: Body) -> tuple[Array, Array]:
     """Device poses (m, 4, 3) and (m, 4, 3, 3); devices face -Z, so each is turned about Y."""
-    p, R = _joints(times_s, body)
     joints = [ROLE_JOINT[role] for role in FOUR_POINTS]
     mounts = np.stack([MOUNTS[role] for role in FOUR_POINTS]) / body.scale[0]
     R = R[:, joints]

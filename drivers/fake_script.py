@@ -1,0 +1,196 @@
+"""What the fake person does, second by second: poses between which it moves, and buttons."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from lobstr_hw.drivers.driver import DeviceEvent, EventKind
+from lobstr_hw.rotations import Array, rotation_x, rotation_y, rotation_z
+from lobstr_hw.skeleton import Body, Joint, forward_kinematics
+from lobstr_hw.trackers import TrackerRole
+
+__all__ = ["SCRIPTS", "Move", "Press", "Script"]
+
+ARMS_DOWN = np.radians(75.0)
+Bools = npt.NDArray[np.bool_]
+_LEFT, _RIGHT = TrackerRole.LEFT_HAND, TrackerRole.RIGHT_HAND
+
+
+@dataclass(frozen=True, slots=True)
+class Press:
+    """A button held from one time to another."""
+
+    role: TrackerRole
+    button: str
+    down_s: float
+    up_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """One movement: ``shape`` (m,) of the time since its start, 0 at both ends, scales it."""
+
+    kind: str
+    start_s: float
+    end_s: float
+    shape: Callable[[Array], Array]
+
+
+@dataclass(frozen=True, slots=True)
+class Script:
+    """A whole play.
+
+    Attributes:
+        arms: times and how far the arms are down, 0 (out) to 1 (hanging), straight between.
+        moves: what else happens.
+        presses: of buttons.
+    """
+
+    arms: Sequence[tuple[float, float]]
+    moves: Sequence[Move] = ()
+    presses: Sequence[Press] = field(default_factory=tuple)
+
+    def joints(self, times_s: Array, body: Body) -> tuple[Array, Array]:
+        """The person (m, 22, 3) and (m, 22, 3, 3); the legs stay straight."""
+        at, down = zip(*self.arms, strict=True)
+        lowered = ARMS_DOWN * _smooth(np.interp(times_s, at, down))
+        size = float(1.0 / body.scale[0])
+        R = np.tile(np.eye(3), (len(times_s), 22, 1, 1))
+        R[:, Joint.LEFT_UPPER_ARM] = rotation_z(-lowered)
+        R[:, Joint.RIGHT_UPPER_ARM] = rotation_z(lowered)
+        p_hips = np.tile(body.offsets[0, Joint.HIPS], (len(times_s), 1))
+        for move in self.moves:
+            x = (times_s - move.start_s) / (move.end_s - move.start_s)
+            during = (x > 0.0) & (x < 1.0)
+            if during.any():
+                amount = move.shape(x[during])
+                _MOVES[move.kind](amount, R, p_hips, during, size)
+        return forward_kinematics(R, p_hips, body.offsets[0])
+
+    def events(
+        self, after_s: float, until_s: float, serials: Mapping[TrackerRole, str]
+    ) -> list[DeviceEvent]:
+        """Buttons in (after_s, until_s], oldest first."""
+        events = [
+            DeviceEvent(kind, serials[press.role], time_s, press.button)
+            for press in self.presses
+            for kind, time_s in (
+                (EventKind.BUTTON_DOWN, press.down_s),
+                (EventKind.BUTTON_UP, press.up_s),
+            )
+            if after_s < time_s <= until_s
+        ]
+        return sorted(events, key=lambda event: event.time_s)
+
+
+def _smooth(x: Array) -> Array:
+    return np.asarray(x * x * (3.0 - 2.0 * x))
+
+
+def _bump(x: Array) -> Array:
+    """Out and back once."""
+    return np.asarray(np.sin(np.pi * x) ** 2)
+
+
+def _waves(n: int) -> Callable[[Array], Array]:
+    """To and fro n times."""
+    return lambda x: np.asarray(np.sin(2.0 * np.pi * n * x) * np.minimum(1.0, 8.0 * x * (1.0 - x)))
+
+
+def _nod(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
+    R[at, Joint.NECK] = R[at, Joint.NECK] @ rotation_x(np.radians(15.0) * a)
+    R[at, Joint.HEAD] = R[at, Joint.HEAD] @ rotation_x(np.radians(15.0) * a)
+
+
+def _shake(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
+    R[at, Joint.HEAD] = R[at, Joint.HEAD] @ rotation_y(np.radians(30.0) * a)
+
+
+def _twist(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
+    for hand in (Joint.LEFT_HAND, Joint.RIGHT_HAND):
+        R[at, hand] = R[at, hand] @ rotation_x(np.radians(60.0) * a) @ rotation_y(0.4 * a)
+
+
+def _wave(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
+    for hand in (Joint.LEFT_HAND, Joint.RIGHT_HAND):
+        R[at, hand] = R[at, hand] @ rotation_z(np.radians(35.0) * a)
+
+
+def _bow(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
+    """Forward from the hips; seat and hips give way behind."""
+    R[at, Joint.HIPS] = R[at, Joint.HIPS] @ rotation_x(np.radians(25.0) * a)
+    R[at, Joint.SPINE] = R[at, Joint.SPINE] @ rotation_x(np.radians(20.0) * a)
+    p[at, 2] -= 0.08 * size * a
+
+
+def _walk(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
+    """Forward and back to the place, bobbing with every step."""
+    p[at, 2] += 0.8 * size * a
+    p[at, 1] -= 0.015 * size * (1.0 - np.cos(8.0 * np.pi * a)) / 2.0
+
+
+def _turn(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
+    R[at, Joint.HIPS] = rotation_y(np.radians(70.0) * a) @ R[at, Joint.HIPS]
+
+
+def _reach_down(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
+    """Crouch and lay the right hand down."""
+    p[at, 1] -= 0.45 * size * a
+    R[at, Joint.SPINE] = R[at, Joint.SPINE] @ rotation_x(np.radians(45.0) * a)
+
+
+_MOVES: Mapping[str, Callable[[Array, Array, Array, Bools, float], None]] = {
+    "nod": _nod,
+    "shake": _shake,
+    "twist": _twist,
+    "wave": _wave,
+    "bow": _bow,
+    "walk": _walk,
+    "turn": _turn,
+    "reach_down": _reach_down,
+}
+
+
+def _movement(start_s: float) -> tuple[Move, ...]:
+    """What a person does when asked to move: eight seconds."""
+    parts = (
+        ("nod", 1.6, _waves(2)),
+        ("shake", 1.2, _waves(1)),
+        ("twist", 1.6, _waves(2)),
+        ("wave", 1.2, _waves(1)),
+        ("bow", 1.8, _bump),
+        ("walk", 2.6, _bump),
+        ("turn", 2.0, _waves(1)),
+    )
+    moves = []
+    for kind, seconds, shape in parts:
+        moves.append(Move(kind, start_s, start_s + seconds, shape))
+        start_s += seconds
+    return tuple(moves)
+
+
+SCRIPTS: Mapping[str, Script] = {
+    "calibrate": Script(
+        arms=((0.0, 1.0), (4.0, 1.0), (5.0, 0.0), (8.5, 0.0), (9.5, 1.0)),
+        moves=_movement(10.5),
+        presses=(Press(_RIGHT, "trigger", 1.5, 1.7),),
+    ),
+    "gestures": Script(
+        arms=((0.0, 0.0), (4.0, 0.0), (5.0, 1.0)),
+        presses=(
+            Press(_LEFT, "trigger", 6.0, 8.0),
+            Press(_RIGHT, "trigger", 6.1, 8.0),
+            Press(_LEFT, "grip", 9.0, 11.0),
+            Press(_RIGHT, "grip", 9.0, 11.0),
+            Press(_LEFT, "grip", 12.0, 14.0),
+            Press(_RIGHT, "grip", 12.1, 14.0),
+            Press(_RIGHT, "menu", 15.0, 17.0),
+            Press(_LEFT, "menu", 18.0, 20.0),
+            Press(_RIGHT, "grip", 21.0, 21.8),
+            Press(_RIGHT, "menu", 21.3, 21.5),
+        ),
+    ),
+}
+"""What ``--driver fake:script=NAME`` plays."""
