@@ -1,35 +1,44 @@
-"""``lobstr-calibrate``: from a T-pose to a profile."""
+"""``lobstr-calibrate``: the wizard, with a person and devices or on a log."""
 
 import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from lobstr_hw.errors import DriverUnavailable, LobstrError, ProfileError
+from lobstr_hw.errors import LobstrError, ProfileError
 from lobstr_hw.runtime.profile_path import default_profile_path
 from lobstr_hw.runtime.stopping import StopRequest
 
 if TYPE_CHECKING:
-    from lobstr_hw.calibration import Calibration, TPose
+    from lobstr_hw.drivers.driver import TrackerDriver
+    from lobstr_hw.runtime.wizard.stage import Person
 
 __all__ = ["main"]
 
 STATURES_CM = (100.0, 230.0)
-_POLL_S = 0.1
+CLEARANCES_CM = (0.0, 30.0)
+LONGEST_COUNTDOWN_S = 60.0
 
-EXAMPLES = """example:
+EXAMPLES = """examples:
+  lobstr-calibrate --driver openvr              with a person; spoken, for the headset is on
+  lobstr-calibrate --driver openvr --floor --countdown 5 --height 176
   lobstr-calibrate --sim take.mcap --yes --profile me.json
-  lobstr-live --sim take.mcap --profile me.json
+  lobstr-calibrate --driver fake:script=calibrate    to see what it looks like
 """
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code."""
-    args = _parser().parse_args(argv)
+    parser = _parser()
+    args = parser.parse_args(argv)
+    if args.sim is not None and args.driver:
+        parser.error("--sim is a source of its own; leave --driver out")
+    if args.sim is not None and (args.countdown or args.timeout is not None):
+        parser.error("--countdown and --timeout are for people; a log waits for nobody")
     try:
         with StopRequest() as stop:  # before the slow imports, so that Ctrl-C is clean from here on
             return _run(args, stop)
@@ -52,7 +61,7 @@ def _tell(message: str) -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="lobstr-calibrate",
-        description="Find a T-pose, tell how the trackers sit and how big you are, keep it in a "
+        description="Ask for a T-pose, tell how the trackers sit and how big you are, keep it in a "
         "profile.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -60,44 +69,88 @@ def _parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("--sim", type=Path, metavar="LOG", help="look for the T-pose in a tracker log")
+    add("--driver", action="append", default=[], metavar="NAME[:k=v,...]", help="listen to devices")
     add("--profile", type=Path, metavar="FILE", help="where it goes (your configuration folder)")
     add("--height", type=_stature, metavar="CM", help="your height; otherwise the headset tells")
+    add(
+        "--floor",
+        type=_clearance,
+        nargs="?",
+        const=3.0,
+        metavar="CM",
+        help="touch the floor with a controller first; CM from the floor to the controller's own "
+        "origin when it does (3)",
+    )
+    add("--countdown", type=_countdown, default=0.0, metavar="S", help="before every step (0)")
+    add("--timeout", type=_seconds, metavar="S", help="give up after so long")
+    add("--no-speech", action="store_true", help="bells only")
     add("--yes", action="store_true", help="ask nothing; an old profile is replaced")
     add("--json", action="store_true", help="the result on stdout, as one JSON document")
     return parser
 
 
-def _stature(text: str) -> float:
-    low, high = STATURES_CM
-    value = float(text)
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number") from error
+
+
+def _between(text: str, limits: tuple[float, float], unit: str) -> float:
+    value, (low, high) = _number(text), limits
     if not low <= value <= high:
-        raise argparse.ArgumentTypeError(f"{text} cm is not between {low:g} and {high:g}")
+        raise argparse.ArgumentTypeError(f"{text} {unit} is not between {low:g} and {high:g}")
+    return value
+
+
+def _stature(text: str) -> float:
+    return _between(text, STATURES_CM, "cm")
+
+
+def _clearance(text: str) -> float:
+    return _between(text, CLEARANCES_CM, "cm")
+
+
+def _countdown(text: str) -> float:
+    return _between(text, (0.0, LONGEST_COUNTDOWN_S), "s")
+
+
+def _seconds(text: str) -> float:
+    value = _number(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
     return value
 
 
 def _run(args: argparse.Namespace, stop: Callable[[], bool]) -> int:
-    if args.sim is None:
-        raise DriverUnavailable(
-            "calibrating with devices comes with the hardware drivers, which are not in this "
-            "version. Calibrate from a log: lobstr-calibrate --sim LOG"
-        )
+    driver = _driver(args)
+    if driver is None:
+        return 2
     path = args.profile or default_profile_path()
     if path.exists() and not args.yes and not _may_replace(path):
         raise ProfileError(
             f"{path} is left as it was. --yes replaces it; or give another --profile FILE."
         )
-    pose = _t_pose(args.sim, stop)
-    if pose is None:
+    person = _wizard_on_log(args, driver, stop) if args.sim else _wizard(args, driver, stop)
+    if person is None:
         raise KeyboardInterrupt
-    calibration = _calibrated(pose, args.height)
-    from lobstr_hw.calibration import save_profile
-
-    save_profile(path, calibration)
-    if args.json:
-        print(json.dumps(_document(pose, calibration, path)))
-    else:
-        _show(pose, calibration, path)
+    _save(args, path, person)
     return 0
+
+
+def _driver(args: argparse.Namespace) -> "TrackerDriver | None":
+    from lobstr_hw.drivers.replay import ReplayDriver
+    from lobstr_hw.runtime.sources import driver_from_spec, joined, nothing_to_run
+
+    if args.sim is not None:
+        return ReplayDriver(args.sim)
+    if not args.driver:
+        raise nothing_to_run()
+    try:
+        return joined([driver_from_spec(spec) for spec in args.driver])
+    except ValueError as error:
+        _tell(f"{error}")
+        return None
 
 
 def _may_replace(path: Path) -> bool:
@@ -108,72 +161,79 @@ def _may_replace(path: Path) -> bool:
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
-def _t_pose(log: Path, stop: Callable[[], bool]) -> "TPose | None":
-    """The first T-pose of a log; None when stopped.
+def _person(args: argparse.Namespace) -> "Person":
+    from lobstr_hw.runtime.wizard.stage import Person
+
+    return Person(
+        stature_m=None if args.height is None else args.height / 100.0,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+    )
+
+
+def _clearance_m(args: argparse.Namespace) -> float | None:
+    return None if args.floor is None else args.floor / 100.0
+
+
+def _wizard_on_log(
+    args: argparse.Namespace, driver: "TrackerDriver", stop: Callable[[], bool]
+) -> "Person | None":
+    """What a log gives; None when stopped.
 
     Raises:
         LogFileError: the log cannot be read.
         MissingRole, TPoseNotFound: what was seen, and what to do.
     """
-    from lobstr_hw.calibration import TPoseDetector
     from lobstr_hw.drivers.replay import ReplayDriver
+    from lobstr_hw.runtime.wizard.flow import Wizard
+    from lobstr_hw.runtime.wizard.plan import steps_for_a_log
+    from lobstr_hw.runtime.wizard.run import run_on_log
 
-    with ReplayDriver(log) as driver:
-        if driver.log.damage:
-            _tell(f"{log}: {driver.log.damage}; looking at the {driver.duration_s:.1f} s before.")
-        hints = {device.serial: device.role_hint for device in driver.devices()}
-        detector = TPoseDetector({serial: role for serial, role in hints.items() if role})
-        step = 0
-        while not stop():
-            found = detector.add(driver.poll(step * _POLL_S))
-            if found is not None:
-                return found
-            if driver.finished(step * _POLL_S):
-                raise detector.failure()
-            step += 1
-    return None
+    assert isinstance(driver, ReplayDriver)
+    with driver:
+        damage = driver.log.damage
+        if damage:
+            _tell(f"{args.sim}: {damage}; looking at the {driver.duration_s:.1f} s before.")
+        steps = steps_for_a_log(floor_clearance_m=_clearance_m(args))
+        wizard = Wizard(_person(args), steps)
+        run_on_log(driver, wizard, stop)
+    return wizard.person if wizard.done else None
 
 
-def _calibrated(pose: "TPose", height_cm: float | None) -> "Calibration":
-    from lobstr_hw.calibration import calibrate_t_pose
+def _wizard(
+    args: argparse.Namespace, driver: "TrackerDriver", stop: Callable[[], bool]
+) -> "Person | None":
+    """What a person does; None when stopped."""
+    from lobstr_hw.runtime.clock import HostClock
+    from lobstr_hw.runtime.wizard.flow import Wizard
+    from lobstr_hw.runtime.wizard.front import PersonFront
+    from lobstr_hw.runtime.wizard.plan import steps_for_a_person
+    from lobstr_hw.runtime.wizard.result import spoken_result
+    from lobstr_hw.runtime.wizard.run import run_with_person
+
+    steps = steps_for_a_person(floor_clearance_m=_clearance_m(args), confirm=not args.yes)
+    wizard = Wizard(_person(args), steps, countdown_s=args.countdown)
+    front = PersonFront(speech=not args.no_speech, terminal=sys.stderr.isatty(), tell=_tell)
+    with driver, front:
+        run_with_person(driver, wizard, front, HostClock(), stop, args.timeout)
+        if wizard.done:
+            front.say(spoken_result(wizard.person))
+    return wizard.person if wizard.done else None
+
+
+def _save(args: argparse.Namespace, path: Path, person: "Person") -> None:
+    from lobstr_hw.calibration import save_profile
     from lobstr_hw.poses import Pose
+    from lobstr_hw.runtime.wizard.result import document, show
 
-    calibration = calibrate_t_pose(
-        pose,
-        stature_m=None if height_cm is None else height_cm / 100.0,
-        created=datetime.now(UTC).isoformat(timespec="seconds"),
-    )
-    return replace(calibration, tracking_spaces={"replay": Pose.identity()})
-
-
-def _document(pose: "TPose", calibration: "Calibration", path: Path) -> dict[str, Any]:
-    from lobstr_hw.calibration.verdict import verdict
-
-    return {
-        "profile": str(path),
-        "verdict": str(verdict(calibration.residuals)),
-        "t_pose_s": [pose.start_s, pose.end_s],
-        "stature_m": calibration.stature_m,
-        "hips_height_m": 1.0 / calibration.scale,
-        "scale": calibration.scale,
-        "arm_m": calibration.arm_m,
-        "heading_rad": calibration.heading_rad,
-        "floor_height_m": calibration.floor_m,
-        "trackers": {serial: str(role) for serial, role in calibration.roles.items()},
-        "residuals": asdict(calibration.residuals),
-    }
-
-
-def _show(pose: "TPose", calibration: "Calibration", path: Path) -> None:
-    from rich.console import Console
-
-    from lobstr_hw.runtime.commands.calibrate_tables import closing_words, tables
-
-    console = Console()
-    for table in tables(pose, calibration):
-        console.print(table)
-    for line in closing_words(calibration, path):
-        console.print(line, soft_wrap=True, highlight=False, markup=False)
+    assert person.calibration is not None
+    names = ["replay"] if args.sim else [spec.partition(":")[0] for spec in args.driver]
+    spaces = {name: Pose.identity() for name in names}
+    person.calibration = replace(person.calibration, tracking_spaces=spaces)
+    save_profile(path, person.calibration)
+    if args.json:
+        print(json.dumps(document(person, path)))
+    else:
+        show(person, path)
 
 
 if __name__ == "__main__":

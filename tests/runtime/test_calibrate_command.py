@@ -158,14 +158,27 @@ def test_a_log_without_a_t_pose_is_told_with_how_close_it_came(
     assert not profile.exists()
 
 
-def test_without_a_log_it_says_that_devices_come_later(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_without_a_source_it_says_which_there_are(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 1
-    assert "--sim LOG" in capsys.readouterr().err
+    message = capsys.readouterr().err
+    assert "--driver" in message
+    assert "fake: ready" in message
 
 
-@pytest.mark.parametrize("arguments", [["--height", "17"], ["--height", "tall"], ["--what"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--height", "17"],
+        ["--height", "tall"],
+        ["--floor", "-1"],
+        ["--countdown", "999"],
+        ["--timeout", "0"],
+        ["--timeout", "soon"],
+        ["--sim", "take.mcap", "--driver", "fake"],
+        ["--sim", "take.mcap", "--countdown", "3"],
+        ["--what"],
+    ],
+)
 def test_wrong_use_leaves_with_2(arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as left:
         main(arguments)
