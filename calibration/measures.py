@@ -67,6 +67,7 @@ class Measures:
     Attributes:
         stature_m, hips_height_m, trunk_m, arm_m, shoulders_m: see ``body_from_measures``.
         levers: (4, 3) from joint to tracker, in the joint's frame; FOUR_POINTS.
+        lever_deviation: (4, 3) how far off these may be.
         hips_height_deviation_m: how far off the hips' height may be.
         arm_deviation_m: how far off the arms may be.
         misfit: root mean square of all residuals over their deviations; above 2 something is odd.
@@ -78,6 +79,7 @@ class Measures:
     arm_m: float
     shoulders_m: float
     levers: Array
+    lever_deviation: Array
     hips_height_deviation_m: float
     arm_deviation_m: float
     misfit: float
@@ -85,6 +87,7 @@ class Measures:
     def __post_init__(self) -> None:
         """Check the shape once."""
         object.__setattr__(self, "levers", frozen(self.levers, (4, 3)))
+        object.__setattr__(self, "lever_deviation", frozen(self.lever_deviation, (4, 3)))
 
     def body(self) -> Body:
         """The body of these measures (n = 1)."""
@@ -239,6 +242,7 @@ def _measures(x: Array, covariance: Array, misfit: float) -> Measures:
         arm,
         shoulders,
         levers,
+        np.sqrt(np.diag(C)[_LEVERS]).reshape(4, 3),
         float(np.sqrt(by_hips @ C[:2, :2] @ by_hips)),
         float(np.sqrt(by_arm @ C[np.ix_([0, 2], [0, 2])] @ by_arm)),
         misfit,

@@ -1,0 +1,98 @@
+"""What the trackers did while somebody moved, on one time grid."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lobstr_hw.poses import frozen
+from lobstr_hw.predictors.predictor import Bools
+from lobstr_hw.rotations import Array, slerp, transpose, to_rotation_vector
+from lobstr_hw.trackers import TrackerSample
+
+__all__ = ["Movement", "movement_from_samples"]
+
+RATE_HZ = 45.0
+_LONGEST_GAP_S = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Movement:
+    """Four trackers in time.
+
+    Attributes:
+        times_s: (m,) even steps of 1 / RATE_HZ.
+        p: (m, 4, 3) positions in the order of FOUR_POINTS, in the tracking space, metres.
+        R: (m, 4, 3, 3) rotations.
+        tracked: (m, 4) whether both were seen; elsewhere they are in between what was.
+    """
+
+    times_s: Array
+    p: Array
+    R: Array
+    tracked: Bools
+
+    def __post_init__(self) -> None:
+        """Check the shapes once."""
+        object.__setattr__(self, "p", frozen(self.p, (4, 3)))
+        object.__setattr__(self, "R", frozen(self.R, (4, 3, 3)))
+        if not len(self.times_s) == len(self.p) == len(self.R) == len(self.tracked):
+            raise ValueError(f"{len(self.times_s)} times, {len(self.p)} positions")
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.times_s)
+
+
+def movement_from_samples(
+    samples: Iterable[TrackerSample],
+    serials: Sequence[str],
+    start_s: float = -np.inf,
+    end_s: float = np.inf,
+) -> Movement:
+    """The four trackers between two times, resampled to one grid.
+
+    Args:
+        samples: of any trackers, each one's oldest first.
+        serials: in the order of FOUR_POINTS.
+        start_s: nothing before it counts.
+        end_s: nothing after it counts.
+    """
+    kept: dict[str, list[TrackerSample]] = {serial: [] for serial in serials}
+    for sample in samples:
+        if sample.serial in kept and start_s <= sample.time_s <= end_s and _usable(sample):
+            kept[sample.serial].append(sample)
+    if min(len(own) for own in kept.values()) < 2:
+        return Movement(np.empty(0), np.empty((0, 4, 3)), np.empty((0, 4, 3, 3)), _none())
+    begin = max(own[0].time_s for own in kept.values())
+    end = min(own[-1].time_s for own in kept.values())
+    times = np.arange(begin, max(end, begin), 1.0 / RATE_HZ)
+    tracks = [_track(kept[serial], times) for serial in serials]
+    p, R, tracked = (np.stack(values, axis=1) for values in zip(*tracks, strict=True))
+    return Movement(times, p, R, tracked)
+
+
+def _none() -> Bools:
+    return np.empty((0, 4), dtype=bool)
+
+
+def _usable(sample: TrackerSample) -> bool:
+    pose = sample.T_world_tracker
+    return bool(
+        sample.tracked
+        and pose.p is not None
+        and np.isfinite(pose.p).all()
+        and np.isfinite(pose.R).all()
+    )
+
+
+def _track(samples: Sequence[TrackerSample], times: Array) -> tuple[Array, Array, Bools]:
+    """One tracker's p (m, 3), R (m, 3, 3) and whether it was seen (m) at times within its own."""
+    own = np.array([sample.time_s for sample in samples])
+    p = np.array([sample.T_world_tracker.p for sample in samples])
+    R = np.array([sample.T_world_tracker.R for sample in samples])
+    j = np.clip(np.searchsorted(own, times, side="right"), 1, len(own) - 1)
+    gap = own[j] - own[j - 1]
+    f = np.clip((times - own[j - 1]) / np.maximum(gap, 1e-9), 0.0, 1.0)
+    between = p[j - 1] + f[:, None] * (p[j] - p[j - 1])
+    return between, slerp(R[j - 1], R[j], f), gap <= _LONGEST_GAP_S
