@@ -1,10 +1,10 @@
 """A thread that reads a device, so that nobody else waits for it."""
 
-import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Event, Thread
+from time import perf_counter
 from typing import Protocol
 
 from lobstr_hw.errors import DriverError
@@ -84,10 +84,8 @@ class ReadingThread:
         self._thread.start()
 
     def take(self) -> list[tuple[float, Arrival]]:
-        """All that came in since the last call, oldest first, each with its age in seconds."""
-        taken = [self._arrivals.popleft() for _ in range(len(self._arrivals))]
-        now = time.perf_counter()
-        return [(now - arrived, arrival) for arrived, arrival in taken]
+        """All that came in since the last call, oldest first, each with its ``perf_counter``."""
+        return [self._arrivals.popleft() for _ in range(len(self._arrivals))]
 
     def close(self) -> None:
         """Stop reading and let go of the device."""
@@ -124,4 +122,4 @@ class ReadingThread:
             self._source = None
 
     def _put(self, arrival: Arrival) -> None:
-        self._arrivals.append((time.perf_counter(), arrival))
+        self._arrivals.append((perf_counter(), arrival))

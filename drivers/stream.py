@@ -3,15 +3,18 @@
 A new driver says how to connect and what a record means (docs/writing-a-driver.md).
 """
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from time import perf_counter
 
 from lobstr_hw.drivers.device_clock import DeviceClock
 from lobstr_hw.drivers.driver import DeviceEvent, DeviceInfo, EventKind, TrackerDriver
 from lobstr_hw.drivers.reading_thread import (
+    QUEUE_LENGTH,
+    Arrival,
     Command,
     LinkLost,
-    Lost,
     Reading,
     ReadingThread,
     Source,
@@ -50,7 +53,9 @@ class StreamDriver(TrackerDriver):
         self._clock = DeviceClock()
         self._trackers: dict[str, _Tracker] = {}
         self._events: list[DeviceEvent] = []
-        self._now_s, self._last_s = -float("inf"), 0.0
+        self._waiting: deque[tuple[float, Arrival]] = deque(maxlen=QUEUE_LENGTH)
+        self._now_s = self._lead_s = -float("inf")
+        self._last_s = 0.0
 
     def _connect(self) -> Source:
         """Open the device and set it going; DeviceBusy, TrackerNotFound, DriverUnavailable."""
@@ -74,19 +79,20 @@ class StreamDriver(TrackerDriver):
             raise TrackerNotFound(f"the device went while it was set up: {error}") from error
 
     def poll(self, now_s: float) -> Sequence[TrackerSample]:
-        """What came in since the last poll; nothing for a time that was asked for already."""
+        """What was measured by now and not given before; nothing for a time asked for already."""
         if self._thread is None or now_s <= self._now_s:
             return ()
         self._now_s = now_s
-        arrivals = [(now_s - max(age_s, 0.0), what) for age_s, what in self._thread.take()]
-        for arrived_s, what in arrivals:
+        # a tick may come late, never early: the earliest tells what perf_counter is on this clock
+        self._lead_s = max(self._lead_s, now_s - perf_counter())
+        for arrived_s, what in self._thread.take():
             if isinstance(what, Reading) and what.device_s is not None:
                 self._clock.observe(what.device_s, arrived_s)
+            self._waiting.append((arrived_s, what))
         samples: list[TrackerSample] = []
-        for arrived_s, what in arrivals:
-            samples += self._heard(what, arrived_s)
-        samples += self._silent()
-        return samples
+        while self._waiting and self._time(*self._waiting[0]) <= now_s:
+            samples += self._heard(*self._waiting.popleft())
+        return samples + self._silent()
 
     def devices(self) -> Sequence[DeviceInfo]:
         """The trackers seen since opening."""
@@ -109,24 +115,24 @@ class StreamDriver(TrackerDriver):
         self._clock = DeviceClock()
         self._trackers.clear()
         self._events.clear()
-        self._now_s, self._last_s = -float("inf"), 0.0
+        self._waiting.clear()
+        self._now_s = self._lead_s = -float("inf")
+        self._last_s = 0.0
 
-    def _time(self, time_s: float) -> float:
-        """No newer than now and no older than the last sample: a new offset must not step back."""
-        self._last_s = max(self._last_s, min(time_s, self._now_s))
-        return self._last_s
+    def _time(self, arrived_s: float, what: Arrival) -> float:
+        """When it was measured: no later than it arrived, no earlier than what was given before."""
+        measured_s = arrived_s
+        if isinstance(what, Reading) and what.device_s is not None:
+            measured_s = min(arrived_s, self._clock.host_s(what.device_s))
+        return max(self._last_s, measured_s + self._lead_s)
 
-    def _heard(self, what: Reading | Command | Lost, arrived_s: float) -> list[TrackerSample]:
+    def _heard(self, arrived_s: float, what: Arrival) -> list[TrackerSample]:
+        self._last_s = time_s = self._time(arrived_s, what)
         if isinstance(what, Reading):
-            device_s = what.device_s
-            time_s = arrived_s if device_s is None else self._clock.host_s(device_s)
-            return self._read(what, arrived_s, self._time(time_s))
-        time_s = self._time(arrived_s)
+            return self._read(what, arrived_s, time_s)
         if isinstance(what, Command):
             self._events.append(DeviceEvent(EventKind.COMMAND, "", time_s, what.name))
             return []
-        if what.serial is None:
-            self._clock = DeviceClock()
         serials = self._trackers if what.serial is None else [what.serial]
         return [sample for serial in serials for sample in self._lose(serial, time_s)]
 
@@ -153,9 +159,13 @@ class StreamDriver(TrackerDriver):
         tracker.buttons = reading.buttons
 
     def _silent(self) -> list[TrackerSample]:
-        quiet = [s for s, t in self._trackers.items() if self._now_s - t.arrived_s > SILENCE_S]
-        time_s = self._time(self._now_s) if quiet else 0.0
-        return [sample for serial in quiet for sample in self._lose(serial, time_s)]
+        """One second without a word; not while words wait for their time to come."""
+        since_s = self._now_s - self._lead_s - SILENCE_S
+        quiet = [s for s, t in self._trackers.items() if t.arrived_s < since_s and not t.gone]
+        if not quiet or self._waiting:
+            return []
+        self._last_s = self._now_s
+        return [sample for serial in quiet for sample in self._lose(serial, self._now_s)]
 
     def _lose(self, serial: str, time_s: float) -> list[TrackerSample]:
         tracker = self._trackers.get(serial)

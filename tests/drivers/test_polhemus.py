@@ -205,6 +205,9 @@ def polhemus_bed(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Pol
 
 
 @pytest.mark.bed
+@pytest.mark.parametrize(
+    "polhemus_bed", [PolhemusModel.FASTRAK, PolhemusModel.LIBERTY], indirect=True
+)
 class TestPolhemusContract(StreamDriverContract):
     @pytest.fixture
     def bed(self, polhemus_bed: PolhemusBed) -> PolhemusBed:
