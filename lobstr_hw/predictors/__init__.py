@@ -7,6 +7,7 @@ from lobstr_hw.predictors.predictor import Frame, ModelCard, Prediction, Predict
 
 __all__ = [
     "PREDICTOR_NAMES",
+    "SHIPPED",
     "SHIPPED_WEIGHTS",
     "Frame",
     "ModelCard",
@@ -16,8 +17,11 @@ __all__ = [
     "load_predictor",
 ]
 
-SHIPPED_WEIGHTS = Path(__file__).resolve().parent.parent / "models" / "lobstr.onnx"
-PREDICTOR_NAMES = ("lobstr", "mean_pose", "standing")
+_MODELS = Path(__file__).resolve().parent.parent / "models"
+SHIPPED_WEIGHTS = _MODELS / "lobstr.onnx"
+SHIPPED = {"lobstr": SHIPPED_WEIGHTS, "lobstr-paper": _MODELS / "lobstr-paper.onnx"}
+"""Networks by name: what ships, and the paper's recipe to compare with."""
+PREDICTOR_NAMES = (*SHIPPED, "mean_pose", "standing")
 
 
 def load_predictor(spec: str) -> Predictor:
@@ -35,8 +39,8 @@ def load_predictor(spec: str) -> Predictor:
         return standing()
     if spec == "mean_pose":
         return mean_pose(read_card(SHIPPED_WEIGHTS.with_suffix(".json")))
-    if spec == "lobstr":
-        return Lobstr(load_network(SHIPPED_WEIGHTS))
+    if spec in SHIPPED:
+        return Lobstr(load_network(SHIPPED[spec]))
     path = Path(spec)
     if path.suffix == ".onnx":
         return Lobstr(load_network(path))

@@ -16,8 +16,22 @@ from lobstr_hw.errors import ModelError
 from lobstr_hw.training.config import TrainingConfig
 from lobstr_hw.training.dataset import Statistics
 from lobstr_hw.training.network import LobstrNetwork
+from lobstr_hw.training.streams import Position
 
-__all__ = ["Run", "load_checkpoint", "new_run", "save_checkpoint"]
+__all__ = ["Carried", "Run", "load_checkpoint", "new_run", "save_checkpoint"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carried:
+    """What the recipe ``carried`` takes from one step to the next.
+
+    Attributes:
+        hidden: (1, streams, H) after the last chunk.
+        position: of the streams.
+    """
+
+    hidden: torch.Tensor
+    position: Position
 
 
 @dataclass(slots=True, eq=False)
@@ -32,6 +46,8 @@ class Run:
         wall_s: seconds spent, over all resumed parts.
         curve: one row per step, and per validation (see ``loop.CURVE_COLUMNS``).
         validation: one row per validation.
+        carried: state of the streams, in the recipe ``carried``.
+        best: weights that were best in validation, in the recipe ``carried``.
     """
 
     network: LobstrNetwork
@@ -41,6 +57,8 @@ class Run:
     wall_s: float = 0.0
     curve: list[list[float]] = field(default_factory=list)
     validation: list[list[float]] = field(default_factory=list)
+    carried: Carried | None = None
+    best: dict[str, torch.Tensor] | None = None
 
 
 def new_run(config: TrainingConfig, stats: Statistics) -> Run:
@@ -52,7 +70,7 @@ def new_run(config: TrainingConfig, stats: Statistics) -> Run:
 
 def save_checkpoint(path: Path, run: Run) -> None:
     """Write atomically: the old file stays whole until the new one is."""
-    document = {
+    document: dict[str, Any] = {
         "network": run.network.state_dict(),
         "optimizer": run.optimizer.state_dict(),
         "stats": {name: torch.from_numpy(getattr(run.stats, name)) for name in _STATS},
@@ -61,6 +79,10 @@ def save_checkpoint(path: Path, run: Run) -> None:
         "curve": torch.tensor(run.curve, dtype=torch.float64),
         "validation": torch.tensor(run.validation, dtype=torch.float64),
     }
+    if run.carried is not None:
+        document["carried"] = _carried_tensors(run.carried)
+    if run.best is not None:
+        document["best"] = run.best
     partial = path.with_suffix(".partial")
     with partial.open("wb") as file:
         torch.save(document, file)
@@ -86,6 +108,8 @@ def load_checkpoint(path: Path, config: TrainingConfig) -> Run:
         run.optimizer.load_state_dict(document["optimizer"])
         run.step, run.wall_s = int(document["step"]), float(document["wall_s"])
         run.curve, run.validation = document["curve"].tolist(), document["validation"].tolist()
+        run.best = document.get("best")
+        run.carried = _carried_of(document.get("carried"))
     except FileNotFoundError as error:
         raise ModelError(f"{path}: no checkpoint. Start without --resume.") from error
     except (OSError, RuntimeError, KeyError, ValueError, EOFError, pickle.UnpicklingError) as error:
@@ -95,3 +119,18 @@ def load_checkpoint(path: Path, config: TrainingConfig) -> Run:
             "Use the run's own config.json, or start in a new folder."
         ) from error
     return run
+
+
+def _carried_tensors(carried: Carried) -> dict[str, torch.Tensor]:
+    return {
+        "hidden": carried.hidden,
+        "episode": torch.from_numpy(carried.position.episode),
+        "chunk": torch.from_numpy(carried.position.chunk),
+    }
+
+
+def _carried_of(document: dict[str, torch.Tensor] | None) -> Carried | None:
+    if document is None:
+        return None
+    position = Position(document["episode"].numpy(), document["chunk"].numpy())
+    return Carried(document["hidden"], position)

@@ -1,7 +1,7 @@
 """Everything a training run depends on besides its data; saved beside the run."""
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -9,12 +9,28 @@ from lobstr_hw.errors import ModelError
 from lobstr_hw.features import Form
 from lobstr_hw.training.augmentation import Augmentation
 
-__all__ = ["LossWeights", "TrainingConfig", "read_config", "write_config"]
+__all__ = [
+    "RECIPES",
+    "CarriedSettings",
+    "LossWeights",
+    "Recipe",
+    "TrainingConfig",
+    "read_config",
+    "recipe_config",
+    "write_config",
+]
+
+Recipe = Literal["paper", "carried"]
+RECIPES: tuple[Recipe, ...] = ("paper", "carried")
 
 
 @dataclass(frozen=True, slots=True)
 class LossWeights:
-    """The paper's lambda 1 to 4."""
+    """The paper's lambda 1 to 4.
+
+    In the recipe ``carried``, ``toe`` weighs the mean of knee, ankle and toe base, and ``velocity``
+    the true difference of two frames, in metres per grid step.
+    """
 
     pose: float = 1.0
     toe: float = 0.1
@@ -23,10 +39,45 @@ class LossWeights:
 
 
 @dataclass(frozen=True, slots=True)
+class CarriedSettings:
+    """What only the recipe ``carried`` has: episodes of clips, and what is done to them.
+
+    Attributes:
+        mean_chunks: of an episode (geometric, at most the clip); then the state is zero again.
+        warm_up: frames of an episode without a loss, from a zero state nobody can know better.
+        people_power: a person's share of the frames drawn goes with minutes to this power.
+        motion_power: a kind of motion's share (speed, direction, low hips) likewise.
+        most_often: no frame is drawn more often than this times the mean.
+        warp_share: of the episodes that are played at another speed.
+        warp_min, warp_max: of that speed; slower and faster people, for nothing.
+        lever_m: deviation along each axis of a tracker's constant place off its joint.
+        size: relative deviation of the body's size from the standard skeleton.
+        dropout_share: of the episodes in which one role is lost for a while.
+        gradient_norm: longer gradients are cut; a carried state can explode.
+    """
+
+    mean_chunks: float = 10.0
+    warm_up: int = 5
+    people_power: float = 0.5
+    motion_power: float = 0.75
+    most_often: float = 8.0
+    warp_share: float = 0.5
+    warp_min: float = 0.7
+    warp_max: float = 1.45
+    lever_m: float = 0.02
+    size: float = 0.015
+    dropout_share: float = 0.1
+    gradient_norm: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
 class TrainingConfig:
     """The paper's recipe by default (its appendix 3).
 
     Attributes:
+        recipe: ``paper`` (windows from zero), or ``carried`` (chunks of streams; the state goes on
+            from step to step, the loss is on every frame): then ``batch`` is the number of streams,
+            ``window`` the frames of a chunk, and the validation is over whole clips.
         steps: the paper's "epochs"; each is one batch, as the authors' code has it.
         batch: windows in a step.
         window: frames in a window, from a zero state; the loss is on the last one.
@@ -42,6 +93,7 @@ class TrainingConfig:
         validate_every, checkpoint_every: steps.
     """
 
+    recipe: Recipe = "paper"
     steps: int = 1500
     batch: int = 256
     window: int = 45
@@ -56,9 +108,29 @@ class TrainingConfig:
     mirror: bool = True
     augmentation: Augmentation = field(default_factory=Augmentation)
     weights: LossWeights = field(default_factory=LossWeights)
+    carried: CarriedSettings = field(default_factory=CarriedSettings)
     validation_windows: int = 512
     validate_every: int = 50
     checkpoint_every: int = 50
+
+
+_CARRIED = TrainingConfig(
+    recipe="carried",
+    steps=4000,
+    batch=64,
+    window=60,
+    hidden_size=384,
+    # 0.04 of the first rate after 4000 steps
+    learning_rate_decay=0.9992,
+    # the position of three joints guides the legs; the contact gets a gradient that it can feel
+    weights=LossWeights(pose=1.0, toe=1.0, velocity=4.5, contact=0.05),
+    validate_every=200,
+)
+
+
+def recipe_config(recipe: Recipe, **changes: Any) -> TrainingConfig:
+    """A recipe's own settings, with changes by name."""
+    return replace(_CARRIED if recipe == "carried" else TrainingConfig(), **changes)
 
 
 def write_config(path: Path, config: TrainingConfig) -> None:
@@ -76,6 +148,7 @@ def read_config(path: Path, **changes: Any) -> TrainingConfig:
         document = json.loads(path.read_text(encoding="utf-8")) | changes
         document["augmentation"] = Augmentation(**document.get("augmentation", {}))
         document["weights"] = LossWeights(**document.get("weights", {}))
+        document["carried"] = CarriedSettings(**document.get("carried", {}))
         return TrainingConfig(**document)
     except (OSError, ValueError, TypeError) as error:
         raise ModelError(

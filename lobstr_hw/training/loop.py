@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from lobstr_hw.training.augmentation import Augmentation
+from lobstr_hw.training.carried import train_carried
 from lobstr_hw.training.checkpoint import Run
 from lobstr_hw.training.config import TrainingConfig
 from lobstr_hw.training.dataset import Clips, Statistics, Windows, draw_windows
@@ -17,7 +18,15 @@ from lobstr_hw.training.losses import Targets, losses
 __all__ = ["CURVE_COLUMNS", "VALIDATION_COLUMNS", "train", "train_step", "validate"]
 
 CURVE_COLUMNS = ("step", "total", "pose", "toe_m", "velocity_m", "contact", "learning_rate")
-VALIDATION_COLUMNS = ("step", "toe_cm", "rotation_deg", "contact_accuracy", "balanced_accuracy")
+VALIDATION_COLUMNS = (
+    "step",
+    "toe_cm",
+    "rotation_deg",
+    "contact_accuracy",
+    "balanced_accuracy",
+    "velocity_cm_s",
+)
+"""The velocity only in the recipe ``carried``: windows have one frame each."""
 
 _VALIDATION_STREAM = 2**31
 """A step number no training step has: the validation windows are always the same."""
@@ -28,6 +37,9 @@ def train(
 ) -> Iterator[Run]:
     """Go on until ``config.steps``, giving the run after each step; it changes in place."""
     torch.set_num_threads(config.threads)
+    if config.recipe == "carried":
+        yield from train_carried(run, clips, validation, config)
+        return
     held_out = _validation_windows(validation, config)
     while run.step < config.steps:
         run.curve.append(train_step(run, clips, config))

@@ -14,7 +14,8 @@ __all__ = ["plot_curves", "write_curves"]
 def write_curves(folder: Path, run: Run) -> None:
     """``curve.csv`` (each step) and ``validation.csv``."""
     _write(folder / "curve.csv", CURVE_COLUMNS, run.curve)
-    _write(folder / "validation.csv", VALIDATION_COLUMNS, run.validation)
+    width = len(run.validation[0]) if run.validation else len(VALIDATION_COLUMNS)
+    _write(folder / "validation.csv", VALIDATION_COLUMNS[:width], run.validation)
 
 
 def _write(path: Path, columns: Sequence[str], rows: Sequence[Sequence[float]]) -> None:

@@ -14,21 +14,24 @@ from lobstr_hw.predictors.weights import NetworkCard, write_card
 from lobstr_hw.skeleton import SKELETON_VERSION
 from lobstr_hw.trackers import FOUR_POINTS
 from lobstr_hw.training.checkpoint import Run, load_checkpoint
-from lobstr_hw.training.config import TrainingConfig, read_config
+from lobstr_hw.training.config import Recipe, TrainingConfig, read_config
 from lobstr_hw.training.dataset import RATE_HZ
 from lobstr_hw.training.export import ExportError, export_network
+from lobstr_hw.training.loop import VALIDATION_COLUMNS
 from lobstr_hw.training.network import parameter_count
 from lobstr_hw.training.sources import notices
 
 __all__ = ["export_run", "network_card"]
 
 MODEL_VERSION = "1"
+NAMES: dict[Recipe, str] = {"carried": "lobstr", "paper": "lobstr-paper"}
+"""Of the predictor that a recipe's weights make."""
 
 
 def network_card(run: Run, config: TrainingConfig, details: dict[str, Any]) -> NetworkCard:
     """What the code needs to know of these weights, and what people want to know."""
     model = ModelCard(
-        name="lobstr",
+        name=NAMES[config.recipe],
         version=MODEL_VERSION,
         rate_hz=RATE_HZ,
         delay_frames=0,
@@ -55,6 +58,8 @@ def network_card(run: Run, config: TrainingConfig, details: dict[str, Any]) -> N
 def export_run(folder: Path, out: Path, metrics: Mapping[str, Path] | None = None) -> ExportError:
     """Write the weights of a run's newest checkpoint as ``out`` (.onnx) with its card.
 
+    A run that kept the weights that were best in validation (recipe ``carried``) gives these.
+
     Args:
         folder: of the run.
         out: the ONNX file.
@@ -66,10 +71,15 @@ def export_run(folder: Path, out: Path, metrics: Mapping[str, Path] | None = Non
     config = read_config(folder / "config.json")
     run = load_checkpoint(folder / "checkpoint.pt", config)
     data = _read_json(folder / "data.json")
+    if run.best is not None:
+        run.network.load_state_dict(run.best)
     details = {
+        "recipe": config.recipe,
         "architecture": f"GRU {config.hidden_size}, Linear 128 + ReLU, heads 48 and 4",
         "parameters": parameter_count(run.network),
         "steps_done": run.step,
+        "steps_planned": config.steps,
+        "validation": _validation(run),
         "wall_s": round(run.wall_s),
         "data": data,
         "licences": notices(data.get("minutes_by_set", {})),
@@ -80,6 +90,15 @@ def export_run(folder: Path, out: Path, metrics: Mapping[str, Path] | None = Non
     details["float16_storage_error"] = asdict(error)
     write_card(out.with_suffix(".json"), network_card(run, config, details))
     return error
+
+
+def _validation(run: Run) -> dict[str, float]:
+    """What the run itself measured, of the weights that are exported."""
+    if not run.validation:
+        return {}
+    best = min(run.validation, key=lambda row: row[1])
+    row = run.validation[-1] if run.best is None else best
+    return {name: round(value, 4) for name, value in zip(VALIDATION_COLUMNS, row, strict=False)}
 
 
 def _read_json(path: Path) -> dict[str, Any]:

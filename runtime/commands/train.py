@@ -21,6 +21,7 @@ __all__ = ["main"]
 
 EXAMPLES = """examples:
   lobstr-train DATA --out runs/1 --seed 1      train the paper's recipe on the default split
+  lobstr-train DATA --out runs/2 --recipe carried     the small network that ships
   lobstr-train DATA --out runs/1 --resume      go on after a stop
   lobstr-train --export runs/1 lobstr.onnx     write lobstr.onnx and lobstr.json
 """
@@ -58,8 +59,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--split", type=Path, metavar="FILE", help="clips by part (JSON)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the run")
     parser.add_argument("--resume", action="store_true", help="go on from the last checkpoint")
-    parser.add_argument("--config", type=Path, metavar="FILE", help="a config.json to start from")
-    parser.add_argument("--steps", type=int, help="steps of one batch (1500)")
+    start = parser.add_mutually_exclusive_group()
+    start.add_argument(
+        "--recipe",
+        choices=("paper", "carried"),
+        help="paper (default): windows from zero; carried: the state goes on, as in live use",
+    )
+    start.add_argument("--config", type=Path, metavar="FILE", help="a config.json to start from")
+    parser.add_argument("--steps", type=int, help="steps of one batch (1500; carried 4000)")
     parser.add_argument("--seed", type=int, help="of weights, windows and errors (1)")
     parser.add_argument("--precision", choices=("fp32", "bf16"), help="of the products (fp32)")
     parser.add_argument("--cache", type=Path, metavar="DIR", help="retargeted clips (OUT/cache)")
@@ -107,13 +114,15 @@ def _train(options: argparse.Namespace) -> int:
 
 
 def _config(options: argparse.Namespace) -> "TrainingConfig":
-    from lobstr_hw.training.config import TrainingConfig, read_config
+    from lobstr_hw.training.config import read_config, recipe_config
 
     named = {key: getattr(options, key) for key in ("steps", "seed", "precision")}
     changes = {key: value for key, value in named.items() if value is not None}
     kept = options.out / "config.json"
     source = options.config or (kept if options.resume else None)
-    return read_config(source, **changes) if source else TrainingConfig(**changes)
+    if source:
+        return read_config(source, **changes)
+    return recipe_config(options.recipe or "paper", **changes)
 
 
 def _start(out: Path, config: "TrainingConfig", train: "Clips", resume: bool) -> "Run":

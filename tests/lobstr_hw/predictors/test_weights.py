@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from lobstr_hw.errors import ModelError
-from lobstr_hw.predictors import SHIPPED_WEIGHTS, load_predictor
+from lobstr_hw.predictors import PREDICTOR_NAMES, SHIPPED, SHIPPED_WEIGHTS, load_predictor
 from lobstr_hw.predictors.weights import load_network, read_card, write_card
 
 Card = dict[str, Any]
@@ -109,9 +109,18 @@ def test_cut_weights_are_refused(weights: Path) -> None:
 def test_a_missing_file_and_an_unknown_name_are_told(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="no such weights file"):
         load_predictor(str(tmp_path / "none.onnx"))
-    with pytest.raises(ModelError, match="lobstr, mean_pose, standing"):
+    with pytest.raises(ModelError, match=", ".join(PREDICTOR_NAMES)):
         load_predictor("lobster")
 
 
 def test_a_file_is_loaded_by_its_path(weights: Path) -> None:
     assert load_predictor(str(weights)).card == load_predictor("lobstr").card
+
+
+@pytest.mark.parametrize("name", sorted(SHIPPED))
+def test_a_shipped_network_is_the_one_it_is_named_after(name: str) -> None:
+    if not SHIPPED[name].is_file():
+        pytest.skip(f"{SHIPPED[name].name} does not ship yet")
+    card = load_predictor(name).card
+    assert card.name == name
+    assert card.details["licences"]

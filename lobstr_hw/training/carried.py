@@ -1,0 +1,162 @@
+"""Training with carried state: truncated back-propagation through time over endless streams.
+
+The state goes from chunk to chunk as it will from frame to frame when a person wears the trackers;
+the gradient stops at the chunk's beginning. Validation is over whole clips of people who are not in
+training, and the weights that were best there are the ones that are exported.
+"""
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from lobstr_hw.features import clip_features, clip_points, reference_frames
+from lobstr_hw.rotations import heading_angle
+from lobstr_hw.training.carried_losses import (
+    ChunkTargets,
+    carried_losses,
+    distance,
+    toe_errors_in_world,
+)
+from lobstr_hw.training.checkpoint import Carried, Run
+from lobstr_hw.training.config import TrainingConfig
+from lobstr_hw.training.dataset import RATE_HZ, Clips
+from lobstr_hw.training.episodes import EpisodeSource
+from lobstr_hw.training.kinematics import rotations_from_6d, toes_in_reference
+from lobstr_hw.training.streams import Chunk, Position, Streams
+
+__all__ = ["train_carried", "validate_carried"]
+
+NOT_SCORED = round(RATE_HZ)
+"""Frames at a clip's start, as in the metrics."""
+
+
+def train_carried(
+    run: Run, clips: Clips, validation: Clips | None, config: TrainingConfig
+) -> Iterator[Run]:
+    """Go on until ``config.steps``, giving the run after each step; it changes in place."""
+    if run.carried is None:
+        hidden = torch.zeros(1, config.batch, config.hidden_size)
+        run.carried = Carried(hidden, Position.start(config.batch))
+    streams = Streams(EpisodeSource(clips, config), config, run.carried.position)
+    held_out = [] if validation is None else _held_out(validation, run, config)
+    while run.step < config.steps:
+        run.curve.append(_train_step(run, streams, config))
+        run.step += 1
+        due = run.step % config.validate_every == 0 or run.step == config.steps
+        if held_out and due:
+            _keep_best(run, [float(run.step), *validate_carried(run, held_out)])
+        yield run
+
+
+def _keep_best(run: Run, row: list[float]) -> None:
+    if all(row[1] < before[1] for before in run.validation):
+        run.best = {name: value.clone() for name, value in run.network.state_dict().items()}
+    run.validation.append(row)
+
+
+def _train_step(run: Run, streams: Streams, config: TrainingConfig) -> list[float]:
+    """One chunk of every stream; returns a row of the curve."""
+    if run.carried is None:
+        raise AssertionError("the state is there from the first step on")
+    chunk = streams.next_chunk()
+    learning_rate = config.learning_rate * config.learning_rate_decay**run.step
+    for group in run.optimizer.param_groups:
+        group["lr"] = learning_rate
+    run.network.train()
+    hidden = run.carried.hidden * torch.from_numpy(~chunk.first)[None, :, None]
+    x = torch.from_numpy((chunk.x - run.stats.input_mean) / run.stats.input_scale)
+    with _precision(config):
+        pose, logits, hidden = run.network(x, hidden, last_only=False)
+    terms = carried_losses(pose, logits, _targets(chunk, config), config.weights)
+    run.optimizer.zero_grad(set_to_none=True)
+    terms.total.backward()  # type: ignore[no-untyped-call]
+    torch.nn.utils.clip_grad_norm_(run.network.parameters(), config.carried.gradient_norm)
+    run.optimizer.step()
+    run.carried = Carried(hidden.detach().float(), streams.position)
+    values = (terms.total, terms.pose, terms.toe, terms.velocity, terms.contact)
+    return [run.step + 1.0, *(float(v.detach()) for v in values), learning_rate]
+
+
+def _targets(chunk: Chunk, config: TrainingConfig) -> ChunkTargets:
+    counted = np.ones(chunk.yaw.shape, dtype=np.float32)
+    counted[chunk.first, : config.carried.warm_up] = 0.0
+    arrays = (chunk.pose, chunk.contact, chunk.yaw, counted)
+    return ChunkTargets(*(torch.from_numpy(a) for a in arrays))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Clip:
+    """A validation clip: input (frames, 37) z-scored, and the truth."""
+
+    folder: str
+    x: Tensor
+    pose: Tensor
+    contact: Tensor
+    yaw: Tensor
+
+
+def _held_out(clips: Clips, run: Run, config: TrainingConfig) -> list[_Clip]:
+    labels = clips.contact if config.contact_label == "floor" else clips.paper_contact
+    out = []
+    for name, a, b in zip(clips.names, clips.start[:-1], clips.start[1:], strict=True):
+        p, R = clips.p[a:b].astype(np.float64), clips.R[a:b].astype(np.float64)
+        x = clip_features(clip_points(p, R, form=config.feature_form), config.feature_form).astype(
+            np.float32
+        )
+        yaw = heading_angle(reference_frames(R[:, 0]))[0].astype(np.float32)
+        arrays = ((x - run.stats.input_mean) / run.stats.input_scale, clips.pose[a:b], labels[a:b])
+        out.append(_Clip(str(name).split("/")[0], *map(torch.from_numpy, (*arrays, yaw))))
+    return [clip for clip in out if len(clip.x) > NOT_SCORED + 1]
+
+
+def validate_carried(run: Run, clips: list[_Clip]) -> list[float]:
+    """Toe error (cm), rotation error (degrees), contact accuracy, balanced, velocity error (cm/s).
+
+    The state is carried from each clip's start. Folders count alike: the mean of their means.
+    """
+    run.network.eval()
+    tables: dict[str, list[Tensor]] = {}
+    with torch.no_grad():
+        for clip in clips:
+            tables.setdefault(clip.folder, []).append(_sums(run, clip))
+    return torch.stack([_scores(torch.stack(t).sum(0)) for t in tables.values()]).mean(0).tolist()
+
+
+def _sums(run: Run, clip: _Clip) -> Tensor:
+    """Frames; toe and rotation error; labels on, right on, off, right off; steps; velocity."""
+    pose, logits, _ = run.network(clip.x[None], last_only=False)
+    pose, logits = pose[0, NOT_SCORED:], logits[0, NOT_SCORED:]
+    truth, contact, yaw = (a[NOT_SCORED:] for a in (clip.pose, clip.contact, clip.yaw))
+    errors = toes_in_reference(pose) - toes_in_reference(truth)
+    moved = torch.diff(toe_errors_in_world(errors, yaw), dim=0)
+    half_sine = (rotations_from_6d(pose) - rotations_from_6d(truth)).flatten(-2).norm(dim=-1)
+    angle = 2.0 * torch.asin((half_sine / 8.0**0.5).clamp(max=1.0))
+    said = logits.reshape(-1, 2, 2).argmax(-1) > 0
+    sums = [
+        len(pose),
+        distance(errors).mean(-1).sum(),
+        angle.mean((-1, -2)).sum(),
+        contact.sum(),
+        (said & contact).sum(),
+        (~contact).sum(),
+        (~said & ~contact).sum(),
+        len(moved),
+        distance(moved).mean(-1).sum(),
+    ]
+    return torch.tensor([float(value) for value in sums], dtype=torch.float64)
+
+
+def _scores(sums: Tensor) -> Tensor:
+    frames, toe, angle, on, right_on, off, right_off, steps, velocity = sums
+    accuracy = (right_on + right_off) / (on + off)
+    balanced = 0.5 * (right_on / on.clamp(min=1.0) + right_off / off.clamp(min=1.0))
+    toe_cm, speed_cm_s = 100.0 * toe / frames, 100.0 * RATE_HZ * velocity / steps
+    return torch.stack([toe_cm, torch.rad2deg(angle / frames), accuracy, balanced, speed_cm_s])
+
+
+def _precision(config: TrainingConfig) -> AbstractContextManager[object]:
+    return torch.autocast("cpu", dtype=torch.bfloat16, enabled=config.precision == "bf16")
