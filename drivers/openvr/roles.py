@@ -64,9 +64,7 @@ def said_role(facts: Facts) -> TrackerRole | None:
         return TrackerRole.HEAD
     if facts.device_class == CONTROLLER:
         return HANDS.get(facts.hand)
-    if facts.device_class != TRACKER:
-        return None
-    # a hand role of this class means nothing: a wireless adapter poses as a tracker in the left
-    # hand (GodotVR/godot_openvr#68)
-    place = SETTINGS.get(facts.setting.split(",")[0])
+    # a hand role of any other class means nothing: a wireless adapter poses as a tracker in the
+    # left hand (GodotVR/godot_openvr#68)
+    place = SETTINGS.get(facts.setting)
     return PLACES.get(place or facts.controller_type.removeprefix(f"{TRACKER_TYPE}_"))

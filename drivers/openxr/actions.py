@@ -77,7 +77,7 @@ class Actions:
                 yield role
 
     def presses(self) -> Iterator[Press]:
-        """What changed since the last call."""
+        """What changed since the last call; what cannot be told counts as let go."""
         for key, query in self._buttons.items():
             state = self._xr.get_action_state_boolean(self._session, query)
             down = bool(state.is_active and state.current_state)

@@ -12,7 +12,7 @@ from lobstr_hw.drivers.device_clock import DeviceClock
 from lobstr_hw.drivers.driver import DeviceEvent, DeviceInfo, EventKind, Probe, TrackerDriver
 from lobstr_hw.drivers.openxr.init_errors import translated
 from lobstr_hw.drivers.openxr.locations import judge
-from lobstr_hw.drivers.openxr.session import Device, Happening, Session
+from lobstr_hw.drivers.openxr.session import HAND_SERIALS, Device, Happening, Session
 from lobstr_hw.drivers.vendor import probe_library, require_library
 from lobstr_hw.poses import PartialPose
 from lobstr_hw.trackers import TrackerRole, TrackerSample, TrackingState
@@ -147,8 +147,7 @@ class OpenXRDriver(TrackerDriver):
             self._infos[serial] = self._info(device)
             yield self._sample(session, device, time_s)
         self._there = listed
-        if session.awake:
-            self._press(session, time_s)
+        self._press(session, time_s)
 
     def _sample(self, session: Session, device: Device, time_s: float) -> TrackerSample:
         location = session.locate(device, self._clock.host_s(time_s))
@@ -170,13 +169,11 @@ class OpenXRDriver(TrackerDriver):
             yield TrackerSample(serial, pose, time_s, False, TrackingState.GONE)
 
     def _press(self, session: Session, now_s: float) -> None:
-        serials = {device.role: device.serial for device in self._there.values()}
-        behind_s = self._clock.host_s(now_s) - now_s
+        ahead_s = self._clock.host_s(now_s) - now_s
         for press in session.actions.presses():
-            if press.role in serials:
-                kind = EventKind.BUTTON_DOWN if press.down else EventKind.BUTTON_UP
-                time_s = min(max(press.changed_s - behind_s, self._last_s), now_s)
-                self._tell(kind, serials[press.role], time_s, press.name)
+            kind = EventKind.BUTTON_DOWN if press.down else EventKind.BUTTON_UP
+            time_s = min(max(press.changed_s - ahead_s, self._last_s), now_s)
+            self._tell(kind, HAND_SERIALS[press.role], time_s, press.name)
 
     def _info(self, device: Device) -> DeviceInfo:
         role: TrackerRole | None = hint(device.serial, device.role, self._chosen)

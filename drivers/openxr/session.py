@@ -17,7 +17,7 @@ from lobstr_hw.drivers.openxr.runtime_clock import clock_of
 from lobstr_hw.errors import DriverUnavailable
 from lobstr_hw.trackers import TrackerRole
 
-__all__ = ["HEAD_SERIAL", "Device", "Happening", "Session"]
+__all__ = ["HAND_SERIALS", "HEAD_SERIAL", "Device", "Happening", "Session"]
 
 HEADLESS = "XR_MND_headless"
 VIVE_TRACKERS = "XR_HTCX_vive_tracker_interaction"

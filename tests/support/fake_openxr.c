@@ -49,7 +49,7 @@ typedef struct {
     int32_t refuse_instance, refuse_system, refuse_session, refuse_locate; /* XrResult */
     uint32_t without;   /* bits: 1 headless, 2 clock, 4 Vive trackers, 8 xdevs, 16 stage */
     uint32_t messages_sent;
-    int32_t focus_withheld;
+    int32_t focus_withheld, focus_lost_unsaid;
     uint32_t xdev_generation;
     int64_t clock_offset_ns;
     message messages[MESSAGES];
@@ -67,6 +67,7 @@ static char paths[PATHS][PATH_BYTES];
 static uint32_t path_count;
 static struct { int kind, place; XrPath path; } spaces[SPACES]; /* kind: a reference type, or 0 */
 static uint32_t space_count, action_count;
+static place synced[PLACES]; /* what actions tell: as it was at the last sync */
 static int state, attached, running, alive;
 static int own[MESSAGES];
 static uint32_t own_sent, own_read;
@@ -133,6 +134,7 @@ static XrResult XRAPI_CALL create_instance(const XrInstanceCreateInfo *info, XrI
     }
     path_count = space_count = action_count = own_sent = own_read = 0;
     attached = running = 0;
+    memset(synced, 0, sizeof synced);
     alive = 1;
     state = XR_SESSION_STATE_UNKNOWN;
     now->instances++;
@@ -281,17 +283,17 @@ static XrResult XRAPI_CALL create_action_space(XrSession session,
     return new_space(0, -1, info->subactionPath, out);
 }
 
-static place *place_at(const char *path) {
+static const place *place_in(const place *places, const char *path) {
     for (int i = 0; i < PLACES; i++)
-        if (*path && !strcmp(now->places[i].path, path)) return &now->places[i];
+        if (*path && !strcmp(places[i].path, path)) return &places[i];
     return NULL;
 }
 
-static place *place_of(XrSpace space) {
+static const place *place_of(XrSpace space) {
     uint32_t i = (uint32_t)((__typeof__(&spaces[0]))space - spaces);
-    if (spaces[i].kind == XR_REFERENCE_SPACE_TYPE_VIEW) return place_at("/user/head");
+    if (spaces[i].kind == XR_REFERENCE_SPACE_TYPE_VIEW) return place_in(now->places, "/user/head");
     if (spaces[i].place >= 0) return &now->places[spaces[i].place];
-    return spaces[i].path ? place_at(paths[spaces[i].path - 1]) : NULL;
+    return spaces[i].path ? place_in(now->places, paths[spaces[i].path - 1]) : NULL;
 }
 
 static XrResult XRAPI_CALL locate_space(XrSpace space, XrSpace base, XrTime time,
@@ -357,13 +359,15 @@ static XrResult XRAPI_CALL sync_actions(XrSession session, const XrActionsSyncIn
     (void)session;
     if (!attached || info->countActiveActionSets != 1) return XR_ERROR_ACTIONSET_NOT_ATTACHED;
     now->syncs++;
-    return state == XR_SESSION_STATE_FOCUSED ? XR_SUCCESS : XR_SESSION_NOT_FOCUSED;
+    int focused = state == XR_SESSION_STATE_FOCUSED && !now->focus_lost_unsaid;
+    if (focused) memcpy(synced, now->places, sizeof synced);
+    return focused ? XR_SUCCESS : XR_SESSION_NOT_FOCUSED;
 }
 
 static XrResult XRAPI_CALL action_pose(XrSession session, const XrActionStateGetInfo *info,
                                        XrActionStatePose *out) {
     (void)session;
-    const place *found = place_at(paths[info->subactionPath - 1]);
+    const place *found = place_in(synced, paths[info->subactionPath - 1]);
     out->isActive = state == XR_SESSION_STATE_FOCUSED && found && found->connected;
     return XR_SUCCESS;
 }
@@ -373,7 +377,7 @@ static XrResult XRAPI_CALL action_boolean(XrSession session, const XrActionState
     (void)session;
     uintptr_t button = (uintptr_t)info->action - 2;
     if (button >= BUTTONS) return XR_ERROR_ACTION_TYPE_MISMATCH;
-    const place *found = place_at(paths[info->subactionPath - 1]);
+    const place *found = place_in(synced, paths[info->subactionPath - 1]);
     out->isActive = state == XR_SESSION_STATE_FOCUSED && found && found->connected;
     out->currentState = out->isActive && found->pressed[button];
     out->lastChangeTime = found ? found->changed_ns : 0;

@@ -150,7 +150,7 @@ static void acknowledge_quit(void) { now->quits_acknowledged++; }
 
 static void get_setting(const char *section, const char *key, char *out, uint32_t size, int32_t *error) {
     *error = SETTING_UNSET;
-    if (size) *out = '\0';
+    snprintf(out, size, "an unset key leaves what it likes");
     if (strcmp(section, "trackers")) return;
     for (int i = 0; i < SETTINGS; i++) {
         if (strcmp(now->trackers[i].key, key) || !*key) continue;

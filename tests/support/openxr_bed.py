@@ -73,6 +73,7 @@ class Stage(ctypes.Structure):
         ("without", ctypes.c_uint32),
         ("messages_sent", ctypes.c_uint32),
         ("focus_withheld", ctypes.c_int32),
+        ("focus_lost_unsaid", ctypes.c_int32),
         ("xdev_generation", ctypes.c_uint32),
         ("clock_offset_ns", ctypes.c_int64),
         ("messages", Message * MESSAGES),
@@ -125,6 +126,10 @@ class OpenXR:
         """Put a device somewhere over the floor."""
         self.stage.places[index].p[:] = p.tolist()
         self.stage.places[index].quat_xyzw[:] = to_quat_xyzw(R).tolist()
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass on the runtime's clock."""
+        self.stage.clock_offset_ns += round(seconds * 1e9)
 
     def send(self, kind: int, value: int = 0) -> None:
         """Queue a message of the runtime."""

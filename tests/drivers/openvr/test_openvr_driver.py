@@ -320,6 +320,13 @@ class TestRoles:
             info = info_of(driver, "LHR-HELD")
         assert (info.kind, info.role_hint) == ("tracker", TrackerRole.LEFT_HAND)
 
+    def test_a_wireless_adapter_that_poses_as_a_tracker_in_a_hand_is_no_hand(
+        self, empty_steamvr: SteamVR
+    ) -> None:
+        empty_steamvr.add(0, TRACKER, "LHR-ADAPTER", "vive_tracker_handed", LEFT)
+        with load_driver("openvr") as driver:
+            assert role_of(driver, "LHR-ADAPTER") is None
+
     def test_a_role_taken_off_a_hand_is_seen_while_running(self, empty_steamvr: SteamVR) -> None:
         device = empty_steamvr.add(0, CONTROLLER, "LHR-HELD", "vive_tracker_handed", LEFT)
         with load_driver("openvr") as driver:
