@@ -80,7 +80,7 @@ class Actions:
         """What changed since the last call; what cannot be told counts as let go."""
         for key, query in self._buttons.items():
             state = self._xr.get_action_state_boolean(self._session, query)
-            down = bool(state.is_active and state.current_state)
+            down = bool(state.current_state)  # false by the standard where it is not active
             if down != (key in self._down):
                 (self._down.add if down else self._down.discard)(key)
                 yield Press(*key, down, state.last_change_time * 1e-9)

@@ -299,6 +299,7 @@ class TestRoles:
         self, driver: TrackerDriver, steamvr: SteamVR
     ) -> None:
         assert role_of(driver, SERIALS[WAIST]) is TrackerRole.PELVIS
+        steamvr.stage.devices[WAIST].registered_type = b"lighthouse/nothing is set for this"
         steamvr.set_role(f"htc/vive_tracker{SERIALS[WAIST]}", "TrackerRole_Chest")
         steamvr.raise_event(TRACKERS_CHANGED)
         driver.poll(1.0)

@@ -406,7 +406,7 @@ class TestEvents:
     ) -> None:
         driver.poll(1.0)
         openxr.stage.focus_lost_unsaid = 1
-        assert len(driver.poll(1.1)) == 4
+        assert all(sample.tracked for sample in driver.poll(1.1))
 
     def test_a_shift_of_the_floor_is_told(self, driver: TrackerDriver, openxr: OpenXR) -> None:
         openxr.send(SPACE_CHANGING, LOCAL)
