@@ -21,7 +21,7 @@ class Countdown:
             begun_s: the time now.
         """
         self._ends_s = begun_s + length_s
-        self._second = math.inf
+        self._second: float = math.inf
 
     def left_s(self, now_s: float) -> float | None:
         """Until it is over; None once it is."""
@@ -34,8 +34,9 @@ class Countdown:
 
     def words(self, now_s: float) -> list[Spoken]:
         """The second that has just begun, if it is one of the last."""
-        second = math.ceil(self._ends_s - now_s)
-        if not 0 < second < self._second:
+        left_s = self.left_s(now_s)
+        if left_s is None or math.ceil(left_s) >= self._second:
             return []
+        second = math.ceil(left_s)
         self._second = second
         return [Spoken(str(second))] if second <= SPOKEN_S else []

@@ -73,13 +73,19 @@ class DeviceTable:
             return ""
         serial = serials[number - 1]
         old = self.roles.get(serial)
+        spare = next((s for s in serials if s not in self.roles and s != serial), None)
         at = _CYCLE.index(old) if old in _CYCLE else -1
         new = _CYCLE[(at + 1) % len(_CYCLE)]
+        if new is None and spare is None:  # no other device could take over
+            new = _CYCLE[0]
         self._touched.update(serials)
         self._give(serial, new)
+        if new is None and spare is not None and old is not None:
+            self.roles[spare] = old
         return f"number {number} is {'nothing' if new is None else new.replace('_', ' ')}"
 
     def _give(self, serial: str, role: TrackerRole | None) -> None:
+        """A role for a device; who had it takes the old one."""
         old = self.roles.pop(serial, None)
         if role is None:
             return

@@ -22,6 +22,7 @@ PATIENCE_S = 2.5
 """Advice that has stood on the screen for so long is also spoken..."""
 AGAIN_S = 7.0
 """...but not more often than this."""
+DIGITS = tuple("123456789")
 KEYS = "enter: go on   q: stop"
 DEVICE_KEYS = "enter: go on   1-9: change what a device is   q: stop"
 
@@ -90,7 +91,7 @@ class Wizard:
         """A key: a digit names a device, Enter or space goes on, q stops."""
         if key in ("q", "Q", "\x03", "\x1b"):
             self.stopped = True
-        elif key.isdigit() and isinstance(self.stage, FindDevices):
+        elif key in DIGITS and isinstance(self.stage, FindDevices):
             spoken = self.stage.press(int(key))
             return [] if spoken is None else [spoken]
         elif key in ("\r", "\n", " "):

@@ -52,14 +52,14 @@ class TakeTPose(Stage):
         for sample in samples:
             self._glance.add((sample,))
             self._choose(self._held.add((sample,)))
+            if self._best is not None and sample.time_s - self._best_since_s >= SETTLE_S:
+                self._calibrate(self._best)
+                return True
         if self._quality is None or not self._quality.ok:
             self._good_s = None
         elif self._good_s is None:
             self._good_s = now_s - GLANCE_S
-        if self._best is None or now_s - self._best_since_s < SETTLE_S:
-            return False
-        self._calibrate(self._best)
-        return True
+        return False
 
     def end(self) -> bool:
         """A log that ends in a T-pose has one all the same."""
