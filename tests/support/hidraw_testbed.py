@@ -23,6 +23,8 @@ __all__ = ["RemoteDongle"]
 ENVIRONMENT = "LOBSTR_DONGLE"
 DEVICE = "/devices/pci0000:00/0000:00:14.0/usb1/1-1"
 NODE = "/dev/hidraw0"
+FAMILY = socket.AF_INET if sys.platform == "win32" else socket.AF_UNIX
+"""Beds are of Linux only; the types are checked for Windows, which has no such sockets here."""
 ENODEV, EPIPE = 19, 32
 DESCRIPTOR = bytes.fromhex("0600ff0901a101150026ff0075089540090181020901b102c0")
 """Vendor-defined: 64 bytes in, a feature report of 64 bytes, no report numbers."""
@@ -32,7 +34,7 @@ class RemoteDongle:
     """A FakeDongle in the test bed's process, for the program that runs in it."""
 
     def __init__(self, path: str) -> None:
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._socket = socket.socket(FAMILY)
         self._socket.connect(path)
         self._lines = self._socket.makefile("rw", encoding="utf-8")
 
@@ -87,6 +89,7 @@ def _records(vendor: int, product: int) -> list[str]:
 
 def main(command: list[str]) -> int:
     """Set the bed up, run the command in it, take it down."""
+    assert sys.platform == "linux"
     import gi  # type: ignore[import-not-found]
 
     gi.require_version("UMockdev", "1.0")
@@ -178,7 +181,7 @@ def main(command: list[str]) -> int:
                 lines.write(json.dumps(obey(json.loads(text))) + "\n")
                 lines.flush()
 
-    with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX) as server:
+    with tempfile.TemporaryDirectory() as folder, socket.socket(FAMILY) as server:
         path = os.path.join(folder, "dongle")
         server.bind(path)
         server.listen()

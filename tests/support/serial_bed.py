@@ -33,17 +33,22 @@ class SerialDevice:
 
     def plug(self) -> None:
         """A new pseudo-terminal under the old name."""
+        assert sys.platform != "win32"
         import pty
         import tty
 
-        self._master, slave = pty.openpty()
+        master, slave = pty.openpty()
         tty.setraw(slave)
         self.path.unlink(missing_ok=True)
         self.path.symlink_to(os.ttyname(slave))
+        self.begin(master, [master, slave])
+
+    def begin(self, line: int, descriptors: list[int]) -> None:
+        """Power on, and listen to a line; ``descriptors`` are closed by cutting it."""
         self._pipe = os.pipe()
-        self._slave = slave
+        self._master, self._descriptors = line, [*self._pipe, *descriptors]
         self.power_on()
-        self._thread = threading.Thread(target=self._listen, args=(self._master, self._pipe[0]))
+        self._thread = threading.Thread(target=self._listen, args=(line, self._pipe[0]))
         self._thread.start()
 
     def cut(self) -> None:
@@ -53,7 +58,7 @@ class SerialDevice:
         os.write(self._pipe[1], b"x")
         self._thread.join()
         self._thread = None
-        for descriptor in (*self._pipe, self._master, self._slave):
+        for descriptor in self._descriptors:
             os.close(descriptor)
 
     def send(self, data: bytes) -> None:
