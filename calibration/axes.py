@@ -46,5 +46,5 @@ def main_axis(omega: Array, chosen: Bools, expected: Array, rate_hz: float) -> A
             return None
         w, V = np.linalg.eigh(omega[near].T @ omega[near])
         axis = V[:, -1] * np.sign(V[:, -1] @ expected)
-    wobble = float(np.sqrt((w[0] + w[1]) / 2.0 / max(w[2], 1e-12)))
+    wobble = float(np.sqrt(max(w[0] + w[1], 0.0) / 2.0 / max(w[2], 1e-12)))
     return Axis(axis, float(np.sum(np.abs(omega[near] @ axis)) / rate_hz), wobble)
