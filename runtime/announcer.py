@@ -15,7 +15,7 @@ from typing import Self, TextIO
 
 from lobstr_hw.runtime.speech import SpeechEngine, find_speech
 
-__all__ = ["Announcer", "Sound", "Spoken"]
+__all__ = ["RANK", "Announcer", "Sound", "Spoken"]
 
 LONGEST_S = 8.0
 """A voice that takes longer than this hangs."""
@@ -31,6 +31,8 @@ class Sound(StrEnum):
     TROUBLE = "trouble"
 
 
+RANK = (Sound.STEP, Sound.DONE, Sound.TROUBLE)
+"""Of several at once, the last in this row counts."""
 BELLS = {Sound.STEP: 1, Sound.DONE: 2, Sound.TROUBLE: 3}
 BELL_GAP_S = 0.15
 

@@ -216,7 +216,7 @@ def _wizard(
     with driver, front:
         run_with_person(driver, wizard, front, HostClock(), stop, args.timeout)
         if wizard.done:
-            front.say(spoken_result(wizard.person))
+            front.say([spoken_result(wizard.person)])
     return wizard.person if wizard.done else None
 
 

@@ -174,5 +174,8 @@ class Wizard:
 
     def end(self) -> None:
         """Nothing more comes: finish a stage that can do with what it has."""
-        if self.stage.end() and self._index + 1 == len(self._plan):
-            self.done = True
+        while not self.done and self.stage.end():
+            if self._index + 1 == len(self._plan):
+                self.done = True
+            else:
+                self._begin(self._index + 1)

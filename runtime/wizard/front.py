@@ -1,12 +1,12 @@
 """The wizard in front of a person: screen, keyboard, bell and voice."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
-from lobstr_hw.runtime.announcer import Announcer, Spoken
+from lobstr_hw.runtime.announcer import RANK, Announcer, Spoken
 from lobstr_hw.runtime.live_line import LiveLine
 from lobstr_hw.runtime.wizard.keyboard import Keyboard
 from lobstr_hw.runtime.wizard.screen import draw
@@ -59,9 +59,11 @@ class PersonFront:
         """Put this on the screen at its next turn."""
         self._view = replace(view, heard=self._heard)
 
-    def say(self, spoken: Spoken) -> None:
-        """Ring and speak; print where nobody sees a screen."""
-        self._heard = spoken.text
-        self._announcer.say(spoken)
+    def say(self, spoken: Sequence[Spoken]) -> None:
+        """Ring and speak, all of one turn in one breath; print where nobody sees a screen."""
+        if not spoken:
+            return
+        self._heard = " ".join(one.text for one in spoken)
+        self._announcer.say(Spoken(self._heard, max((s.sound for s in spoken), key=RANK.index)))
         if self._tell is not None:
-            self._tell(spoken.text)
+            self._tell(self._heard)

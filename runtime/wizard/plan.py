@@ -4,6 +4,7 @@ from collections.abc import Callable
 from functools import partial
 
 from lobstr_hw.runtime.wizard.find_devices import CONFIRM_S, FindDevices
+from lobstr_hw.runtime.wizard.move_freely import MoveFreely, WatchMovement
 from lobstr_hw.runtime.wizard.stage import Person, Stage
 from lobstr_hw.runtime.wizard.stand_still import StandStill
 from lobstr_hw.runtime.wizard.take_t_pose import TakeTPose
@@ -17,7 +18,7 @@ MakeStage = Callable[[Person], Stage]
 def steps_for_a_person(
     *, floor_clearance_m: float | None = None, confirm: bool = True
 ) -> list[MakeStage]:
-    """Devices, floor (if wanted), standing still, T-pose.
+    """Devices, floor (if wanted), standing still, T-pose, movement.
 
     Args:
         floor_clearance_m: from the floor to a controller that touches it; None leaves the step out.
@@ -26,11 +27,11 @@ def steps_for_a_person(
     steps: list[MakeStage] = [partial(FindDevices, confirm_s=CONFIRM_S if confirm else 0.0)]
     if floor_clearance_m is not None:
         steps.append(partial(TouchFloor, clearance_m=floor_clearance_m))
-    return [*steps, StandStill, TakeTPose]
+    return [*steps, StandStill, TakeTPose, MoveFreely]
 
 
 def steps_for_a_log(*, floor_clearance_m: float | None = None) -> list[MakeStage]:
     """A recording cannot be asked to wait: only what gives numbers."""
     if floor_clearance_m is None:
-        return [TakeTPose]
-    return [partial(TouchFloor, clearance_m=floor_clearance_m), TakeTPose]
+        return [TakeTPose, WatchMovement]
+    return [partial(TouchFloor, clearance_m=floor_clearance_m), TakeTPose, WatchMovement]

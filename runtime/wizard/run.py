@@ -1,6 +1,6 @@
 """Running the wizard: on a log as fast as it can be read, or with a person in front of it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from lobstr_hw.drivers.driver import TrackerDriver
@@ -28,8 +28,8 @@ class Front(Protocol):
         """Put this on the screen."""
         ...
 
-    def say(self, spoken: Spoken) -> None:
-        """Say this."""
+    def say(self, spoken: Sequence[Spoken]) -> None:
+        """Say these together."""
         ...
 
 
@@ -68,10 +68,9 @@ def run_with_person(
         now_s = clock.now_s()
         if timeout_s is not None and now_s - began_s > timeout_s:
             raise CalibrationError(f"not done within {timeout_s:g} s: {wizard.failure()}")
-        for spoken in wizard.add(now_s, driver.poll(now_s), driver.events(), driver.devices()):
-            front.say(spoken)
+        said = wizard.add(now_s, driver.poll(now_s), driver.events(), driver.devices())
         for key in front.keys():
-            for spoken in wizard.press(key):
-                front.say(spoken)
+            said += wizard.press(key)
+        front.say(said)
         front.show(wizard.view())
         clock.sleep(now_s + TURN_S - clock.now_s())

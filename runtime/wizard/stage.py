@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from lobstr_hw.calibration import Calibration, TPose
+from lobstr_hw.calibration.movement import Refinement
 from lobstr_hw.errors import CalibrationError
 from lobstr_hw.runtime.announcer import Spoken
 from lobstr_hw.runtime.wizard.device_table import DeviceTable
@@ -25,6 +26,7 @@ class Person:
         t_pose: once it is found.
         calibration: once it is made.
         movement: samples since the T-pose.
+        refinement: what the movement told; None before it was looked at.
         reasons: why a self-check refuses it; empty when it does not.
     """
 
@@ -35,6 +37,7 @@ class Person:
     t_pose: TPose | None = None
     calibration: Calibration | None = None
     movement: list[TrackerSample] = field(default_factory=list)
+    refinement: Refinement | None = None
     reasons: tuple[str, ...] = ()
 
 

@@ -102,7 +102,7 @@ class TakeTPose(Stage):
 
     def done_words(self) -> Spoken | None:
         """The pose is taken."""
-        return Spoken("Got it. Lower your arms.", Sound.DONE)
+        return Spoken("Got it.", Sound.DONE)
 
     def failure(self) -> CalibrationError:
         """What was missing, as the detector has it."""
