@@ -11,6 +11,7 @@ import json
 import re
 import sys
 from collections.abc import Iterator
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -135,7 +136,7 @@ def _recipe(details: dict[str, Any]) -> str:
         "`lobstr-evaluate DATA --part PART [--mode windowed] [--predictor NAME]`): trackers from "
         "the truth without noise, the true root, lengths on the 1.0 m skeleton. `network` is FK of "
         "what was predicted, `after IK` the shown body with contact lock and floor; contact after "
-        "IK is the lock.\n"
+        f"IK is the lock. Measured {date.today().isoformat()}.\n"
     )
 
 
