@@ -20,8 +20,6 @@ from typing import Any
 __all__ = ["ENVIRONMENT", "FAMILY"]
 
 ENVIRONMENT = "LOBSTR_USB_LINE"
-FAMILY = socket.AF_INET if sys.platform == "win32" else socket.AF_UNIX
-"""Beds are of Linux only; the types are checked for Windows, which has no such sockets here."""
 NODE = "/dev/bus/usb/001/002"
 ENOENT, EAGAIN, ENODEV, EPIPE, ENODATA = 2, 11, 19, 32, 61
 CONTROL, BULK = 2, 3
@@ -29,6 +27,11 @@ BULK_OUT, BULK_IN = 0x02, 0x82
 CAPABILITIES = 0x35
 HARMLESS = frozenset({4, 5, 15, 16, 18, 20, 21, 22, 23, 27})
 """Configuration, claims, resets: all are well."""
+
+if sys.platform == "win32":
+    FAMILY = socket.AF_INET  # never used: for the type checker, which knows no AF_UNIX there
+else:
+    FAMILY = socket.AF_UNIX
 
 
 def descriptors(vendor: int, product: int) -> tuple[bytes, bytes]:
