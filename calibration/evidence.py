@@ -5,8 +5,6 @@ time, and turn their joints about axes that are not quite the anatomist's. These
 those of docs/calibration.md ("Movement"); those of measuring come on top.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from lobstr_hw.calibration.axes import main_axis
@@ -33,6 +31,8 @@ NOD = np.deg2rad([0.0, 3.2, 3.2])
 SHAKE = np.deg2rad([5.0, 0.0, 3.5])
 TWIST = np.deg2rad([0.0, 4.5, 4.5])
 BEND = np.deg2rad([6.0, 6.0, 0.0])
+HAND_TRUST = 1.6
+"""Axes of a hand differ from person to person more than from take to take."""
 
 _LEAST_UPRIGHT_S = 1.0
 _LEAST_WAY_M = 0.5
@@ -124,11 +124,17 @@ def _hand_axis(
     speed = np.linalg.norm(rate_of(p[:, joint], RATE_HZ, 0.1), axis=-1)
     fast = np.linalg.norm(angular_velocity(movement.R[:, joint], RATE_HZ), axis=-1)
     near = speed < 0.2 * fast  # metres: the wrist itself hardly moves
-    return _axis(movement, M, joint, phases.still & near, axis, spread)
+    return _axis(movement, M, joint, phases.still & near, axis, spread, HAND_TRUST)
 
 
 def _axis(
-    movement: Movement, M: Array, joint: int, chosen: Bools, axis: Array, spread: Array
+    movement: Movement,
+    M: Array,
+    joint: int,
+    chosen: Bools,
+    axis: Array,
+    spread: Array,
+    trust: float = 1.0,
 ) -> list[Direction]:
     omega = angular_velocity(movement.R[:, joint], RATE_HZ)
     fast = np.linalg.norm(omega, axis=-1) > _FAST
@@ -136,10 +142,5 @@ def _axis(
     found = main_axis(omega, chosen, M[joint].T @ axis, RATE_HZ)
     if found is None or found.turned_rad < _LEAST_TURN:
         return []
-    measured = _WOBBLE * found.wobble_rad
-    return [Direction(joint, axis, found.seen, _deviation(np.where(spread > 0.0, np.hypot(spread, measured), 0.0)))]
-
-
-def seen_joints(kinds: Sequence[Direction]) -> set[int]:
-    """The joints that something was seen of."""
-    return {direction.joint for direction in kinds}
+    off = np.where(spread > 0.0, np.hypot(spread, _WOBBLE * found.wobble_rad), 0.0)
+    return [Direction(joint, axis, found.seen, _deviation(off), trust)]

@@ -154,9 +154,7 @@ def _hips(
     covariance = np.diag(deviation[PELVIS] ** 2)
     if turns:
         level = np.eye(3)[[0, 2]]
-        pivot = _fitted(
-            movement, PELVIS, M, mean[PELVIS], covariance, turns, _TURN_REST_M, level
-        )
+        pivot = _fitted(movement, PELVIS, M, mean[PELVIS], covariance, turns, _TURN_REST_M, level)
         mean[PELVIS], covariance = _in_joint(pivot, M[PELVIS])
     bows = _bows(movement, M, phases)
     if bows:

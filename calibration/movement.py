@@ -132,9 +132,7 @@ def _oriented(pose: TPose, evidence: Sequence[Direction | Place]) -> Orientation
 def _held(pose: TPose, orientations: Orientations) -> Array:
     """Joints (4, 3, 3) in the T-pose, in the person's heading."""
     R_heading = rotation_y(orientations.heading_rad)
-    return np.asarray(
-        transpose(R_heading) @ pose.R @ transpose(orientations.R_joint_tracker)
-    )
+    return np.asarray(transpose(R_heading) @ pose.R @ transpose(orientations.R_joint_tracker))
 
 
 def _usual(pose: TPose, orientations: Orientations) -> LeverPrior:

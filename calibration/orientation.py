@@ -36,12 +36,15 @@ class Direction:
         axis: (3,) of the joint, unit.
         seen: (3,) the same in the tracker's frame.
         deviation: (3,) radians about each axis of the joint; infinite where it tells nothing.
+        trust: above 1 it weighs as if it were so many times as exact: an axis that one person
+            keeps from take to take is worth more to repeats than it is to the truth.
     """
 
     joint: int
     axis: Array
     seen: Array
     deviation: Array
+    trust: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,12 +56,14 @@ class Place:
         expected: (3,) from the point to the tracker, in the joint's frame, metres.
         found: (3,) the same in the tracker's frame.
         covariance: (3, 3) of the difference, in the joint's frame.
+        trust: as of a direction.
     """
 
     joint: int
     expected: Array
     found: Array
     covariance: Array
+    trust: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,13 +96,17 @@ def fit_orientations(
     for _ in range(_STEPS):
         rows = [*_t_pose(S, M, psi), *_headset(M[0]), *(_row(M, seen) for seen in evidence)]
         rows.append((np.array([psi / HANDS_DEVIATION]), _unit(12)[None] / HANDS_DEVIATION))
+        trust = [1.0] * (len(rows) - len(evidence) - 1) + [seen.trust for seen in evidence] + [1.0]
+        w = np.repeat(np.square(trust), [len(row[0]) for row in rows])
         r = np.concatenate([row[0] for row in rows])
         J = np.concatenate([row[1] for row in rows])
-        spread = np.linalg.inv(J.T @ J)
-        x = -spread @ (J.T @ r)
+        inverse = np.linalg.inv(J.T @ (w[:, None] * J))
+        gain = inverse @ (J.T * w)
+        x = -gain @ r
         M = from_rotation_vector(x[:12].reshape(4, 3)) @ M
         psi += float(x[12])
-    deviation = np.sqrt(np.diag(spread))[:12].reshape(4, 3)
+    # r has unit variance whatever the weights are
+    deviation = np.linalg.norm(gain, axis=1)[:12].reshape(4, 3)
     return Orientations(M, deviation, hands_heading_rad + psi)
 
 
@@ -145,7 +154,7 @@ def _found(M: Array, place: Place) -> tuple[Array, Array]:
 
 
 def _seen(M: Array, d: Direction) -> tuple[Array, Array]:
-    """e x (M b), which is the turn that is left; to first order in a turn x: (e.v) x - v (e.x)."""
+    """What is left, e x (M b); to first order in a turn x: (e.v) x - v (e.x)."""
     v = normalize(M[d.joint] @ d.seen)
     J = float(d.axis @ v) * np.eye(3) - np.outer(v, d.axis)
     weight = 1.0 / np.minimum(d.deviation, _NOTHING)

@@ -1,7 +1,7 @@
 """The point of a tracker that stays where it is while the tracker turns: a lever arm.
 
-If a joint at l (in the tracker's frame) rests, or drifts slowly, then ``p + R l = c + d t`` within a
-short window, a linear equation for l. Windows in which the joint did move fit badly and count
+If a joint at l (in the tracker's frame) rests, or drifts slowly, then ``p + R l = c + d t`` within
+a short window, a linear equation for l. Windows in which the joint did move fit badly and count
 little (Student's t).
 """
 

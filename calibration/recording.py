@@ -1,13 +1,13 @@
 """What the trackers did while somebody moved, on one time grid."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from lobstr_hw.poses import frozen
 from lobstr_hw.predictors.predictor import Bools
-from lobstr_hw.rotations import Array, slerp, transpose, to_rotation_vector
+from lobstr_hw.rotations import Array, slerp
 from lobstr_hw.trackers import TrackerSample
 
 __all__ = ["Movement", "movement_from_samples"]
@@ -42,6 +42,11 @@ class Movement:
     def __len__(self) -> int:
         """Number of frames."""
         return len(self.times_s)
+
+    def between(self, start_s: float, end_s: float = np.inf) -> "Movement":
+        """The part between two times."""
+        part = slice(*np.searchsorted(self.times_s, [start_s, end_s]))
+        return Movement(self.times_s[part], self.p[part], self.R[part], self.tracked[part])
 
 
 def movement_from_samples(
