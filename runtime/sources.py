@@ -9,7 +9,7 @@ from lobstr_hw.drivers.driver import TrackerDriver
 from lobstr_hw.errors import TrackerNotFound
 from lobstr_hw.runtime.many_drivers import ManyDrivers
 
-__all__ = ["bundled_log", "driver_from_spec", "joined", "nothing_to_run"]
+__all__ = ["bundled_log", "driver_from_spec", "drivers_from_specs", "joined", "nothing_to_run"]
 
 RUNTIME_KEYS = ("role", "name")
 
@@ -35,6 +35,18 @@ def driver_from_spec(spec: str) -> TrackerDriver:
 def joined(drivers: Sequence[TrackerDriver]) -> TrackerDriver:
     """One driver for all of them."""
     return drivers[0] if len(drivers) == 1 else ManyDrivers(drivers)
+
+
+def drivers_from_specs(specs: Sequence[str]) -> TrackerDriver:
+    """The drivers that the user named, as one; without any: what is there.
+
+    Raises:
+        ValueError: no such driver, or an option it does not know.
+        TrackerNotFound: none was named, and nothing is there.
+    """
+    if not specs:
+        raise nothing_to_run()
+    return joined([driver_from_spec(spec) for spec in specs])
 
 
 def nothing_to_run() -> TrackerNotFound:

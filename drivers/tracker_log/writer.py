@@ -1,6 +1,7 @@
 """Writing a tracker log: nothing waits in memory while recording, compressed on a clean close."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -135,6 +136,11 @@ class TrackerLogWriter:
         self._writer.finish()  # type: ignore[no-untyped-call]
         self._stream.close()
         copy_compressed(RecordFile(self.path), self.path)
+
+    def abandon(self) -> None:
+        """Leave the file as a kill would: when the disk is full, finishing needs space too."""
+        with suppress(OSError):  # of the bytes that had no room; the file is closed all the same
+            self._stream.close()
 
     def __enter__(self) -> Self:
         """The writer itself."""
