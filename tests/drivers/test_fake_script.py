@@ -10,7 +10,8 @@ from lobstr_hw.trackers import TrackerRole
 
 
 def played(name: str, step_s: float, end_s: float = 24.0) -> tuple[list[float], list[DeviceEvent]]:
-    heights, events = [], []
+    heights: list[float] = []
+    events: list[DeviceEvent] = []
     with FakeDriver(script=name) as driver:
         for k in range(1, round(end_s / step_s) + 1):
             samples = driver.poll(k * step_s)
