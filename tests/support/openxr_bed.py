@@ -144,6 +144,7 @@ def build_runtime(folder: Path) -> Path:
     need("a C compiler", "apt-get install gcc libc6-dev", compiler is not None)
     need("OpenXR's headers", "apt-get install libopenxr-dev", HEADER.exists())
     need("the package pyopenxr", "pip install 'lobstr-hw[openxr]'", find_spec("xr") is not None)
+    folder.mkdir(exist_ok=True)
     library = folder / "fake_openxr.so"
     flags = ["-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared"]
     command = [compiler or "cc", *flags, "-o", str(library), str(SOURCE), "-lm"]
