@@ -72,7 +72,7 @@ class PolhemusDriver(StreamDriver):
             model: which of the three.
             port: of the serial line, or ``usb``.
             baud: of the serial line, as set by the switches at its back.
-            stations: how many are set up; all that the model can have unless given.
+            stations: of a FASTRAK, how many are set up; all four unless given.
             up: the source's axis that points to the ceiling.
             hemisphere: the source's axis towards the people.
             prefix: of the serials, for more than one device.

@@ -105,10 +105,9 @@ def _record(
 
 def setup_commands(model: PolhemusModel, stations: int, hemisphere: str) -> list[bytes]:
     """What makes the device send records, first to last; the first one stops it."""
-    x, y, z = (int(value) for value in axis_vector(hemisphere))
-    each = range(1, stations + 1)
-    side = [b"H%d,%d,%d,%d\r" % (station, x, y, z) for station in each]
-    if model is PolhemusModel.FASTRAK:  # commands of one letter have no carriage return
-        items = [b"O%d,2,11,0\r" % station for station in each]
-        return [b"c", b"U", b"f", *items, *side, b"C"]
-    return [b"P", b"F1\r", b"U0\r", b"O*,2,7,8,0\r", *side, b"C\r"]
+    side = b"%d,%d,%d\r" % tuple(int(value) for value in axis_vector(hemisphere))
+    if model is not PolhemusModel.FASTRAK:  # a star means every station
+        return [b"P", b"F1\r", b"U0\r", b"O*,2,7,8,0\r", b"H*," + side, b"C\r"]
+    items = [b"O%d,2,11,0\r" % station for station in range(1, stations + 1)]
+    sides = [b"H%d," % station + side for station in range(1, stations + 1)]
+    return [b"c", b"U", b"f", *items, *sides, b"C"]  # one letter has no carriage return

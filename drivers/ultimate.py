@@ -68,7 +68,7 @@ class UltimateDriver(StreamDriver):
         Args:
             order: of the rotation's last three numbers; sources disagree.
             pair: let new trackers pair with the dongle.
-            start: tell a tracker that is on but sends no poses to begin tracking.
+            start: tell trackers to begin tracking, and ask for their maps; else only listen.
         """
         super().__init__()
         self._order, self._pair, self._start = order, pair, start
@@ -156,7 +156,8 @@ class _Trackers:
 
     def _pose(self, report: PoseReport) -> Reading:
         index = report.index
-        if self._heard[index] % ASK_EVERY == 0 and self._maps[index] not in HAS_MAP:
+        ask = self._start and self._heard[index] % ASK_EVERY == 0
+        if ask and self._maps[index] not in HAS_MAP:
             self._dongle.send(DongleCommand.TO_TRACKER, to_tracker(index, ASK_MAP_STATE))
         self._heard[index] += 1
         buttons = frozenset({"system"} if self._press(report) & SYSTEM_BUTTON else ())

@@ -19,6 +19,7 @@ from support.waiting import wait_until
 
 from lobstr_hw.drivers import DRIVERS, driver_class, reading_thread, serial_stream, stream
 from lobstr_hw.drivers.driver import EventKind, TrackerDriver
+from lobstr_hw.drivers.stream import StreamDriver
 from lobstr_hw.trackers import TrackerSample, TrackingState
 
 __all__ = ["Sent", "StreamBed", "StreamDriverContract", "gather"]
@@ -60,6 +61,14 @@ def gather(driver: TrackerDriver, now_s: float, count: int) -> list[TrackerSampl
 
     wait_until(arrived, f"{count} samples by {now_s} s")
     return samples
+
+
+def all_arrived(driver: TrackerDriver, count: int) -> None:
+    """Wait until the reading thread has so many, without polling."""
+    assert isinstance(driver, StreamDriver)
+    thread = driver._thread
+    assert thread is not None
+    wait_until(lambda: len(thread._arrivals) >= count, f"{count} arrivals")
 
 
 class StreamDriverContract:
@@ -112,6 +121,7 @@ class StreamDriverContract:
             sent = bed.send(1)
             gather(driver, 1.5, len(sent))
             sent = bed.send(6)
+            all_arrived(driver, len(sent))  # or the offset of the clocks changes on the way
             samples = gather(driver, 2.0, len(sent))
         if bed.has_clock:
             intervals = np.diff([s.time_s for s in samples])
