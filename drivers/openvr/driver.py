@@ -27,7 +27,7 @@ EVENTS_PER_POLL = 256
 LIBRARY = ("openvr", "openvr", "openvr")
 """Module, package, extra."""
 
-NO_RUNTIME = Probe(False, "SteamVR is not installed", "install Steam and SteamVR, start it once")
+NO_RUNTIME = Probe(False, "SteamVR", "install Steam and SteamVR, start SteamVR once")
 BASE_STATION = "base_station"
 
 

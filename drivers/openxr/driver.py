@@ -10,6 +10,7 @@ import numpy as np
 from lobstr_hw.drivers.chosen_roles import ROLE_OPTIONS, by_serial, hint
 from lobstr_hw.drivers.device_clock import DeviceClock
 from lobstr_hw.drivers.driver import DeviceEvent, DeviceInfo, EventKind, Probe, TrackerDriver
+from lobstr_hw.drivers.openxr.active_runtime import active_runtime
 from lobstr_hw.drivers.openxr.init_errors import translated
 from lobstr_hw.drivers.openxr.locations import judge
 from lobstr_hw.drivers.openxr.session import HAND_SERIALS, Device, Happening, Session
@@ -21,6 +22,12 @@ __all__ = ["OpenXRDriver"]
 
 LIBRARY = ("xr", "pyopenxr", "openxr")
 """Module, package, extra."""
+
+NO_RUNTIME = Probe(
+    False,
+    "an active OpenXR runtime",
+    "in SteamVR: Settings, OpenXR, set as active runtime; or start Monado",
+)
 
 START_S = 2.0
 """A runtime needs some frames before it hands out the focus, and hands and trackers with it."""
@@ -57,8 +64,9 @@ class OpenXRDriver(TrackerDriver):
 
     @classmethod
     def probe(cls) -> Probe:
-        """Look for the package; whether a runtime is active only ``open`` can tell."""
-        return probe_library(*LIBRARY)
+        """Look for the package and for an active runtime; whether it runs ``open`` can tell."""
+        package = probe_library(*LIBRARY)
+        return NO_RUNTIME if package.available and active_runtime() is None else package
 
     def open(self) -> None:
         """Begin a session.
