@@ -19,6 +19,7 @@ from lobstr_hw.features import (
 )
 from lobstr_hw.lower_body import mirror_pose_6d, pose_6d, pose_from_6d
 from lobstr_hw.rotations import Array, from_6d, heading_angle, to_6d
+from lobstr_hw.trackers import TrackerRole
 from lobstr_hw.training.augmentation import add_tracker_errors
 from lobstr_hw.training.balance import frame_weights
 from lobstr_hw.training.config import CarriedSettings, TrainingConfig
@@ -27,6 +28,7 @@ from lobstr_hw.training.dataset import RATE_HZ, Clips, Float32
 __all__ = ["Episode", "EpisodeSource"]
 
 DROPOUT_S = (0.1, 1.5)
+HIPS, UP = POINT_ROLES.index(TrackerRole.PELVIS), 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,7 +123,8 @@ class EpisodeSource:
     def _features(self, p: Array, R: Array, rng: np.random.Generator) -> Array:
         config, settings = self._config, self._config.carried
         lever = settings.lever_m * rng.standard_normal((p.shape[1], 3, 1))
-        p = (p + (R @ lever)[..., 0]) * (1.0 + settings.size * rng.standard_normal())
+        lever[HIPS, UP] = 0.0
+        p = p + (R @ lever)[..., 0]
         p, R = add_tracker_errors(p, R, RATE_HZ, config.augmentation, rng)
         valid = np.ones(p.shape[:2], dtype=bool)
         if rng.random() < settings.dropout_share:

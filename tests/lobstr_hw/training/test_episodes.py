@@ -15,7 +15,7 @@ from lobstr_hw.training.dataset import Clips
 from lobstr_hw.training.episodes import Episode, EpisodeSource
 from lobstr_hw.training.streams import Position, Streams
 
-PLAIN = CarriedSettings(mean_chunks=3.0, warp_share=0.0, lever_m=0.0, size=0.0, dropout_share=0.0)
+PLAIN = CarriedSettings(mean_chunks=3.0, warp_share=0.0, lever_m=0.0, dropout_share=0.0)
 CONFIG = recipe_config(
     "carried", batch=5, window=10, mirror=False, augmentation=Augmentation("none"), carried=PLAIN
 )
@@ -86,12 +86,23 @@ def test_the_yaw_is_of_the_true_reference_frame_even_when_trackers_err(clips: Cl
     bad = replace(
         CONFIG,
         augmentation=Augmentation("white", 0.05, 10.0),
-        carried=replace(PLAIN, lever_m=0.1, size=0.1, dropout_share=1.0),
+        carried=replace(PLAIN, lever_m=0.1, dropout_share=1.0),
     )
     headings = heading_angle(reference_frames(clips.R[:, 0].astype(float)))[0]
     for episode in drawn(clips, bad, 10):
         first = int(np.abs(clips.pose - episode.pose[0]).max(axis=1).argmin())
         assert episode.yaw == pytest.approx(headings[first : first + len(episode)], abs=1e-5)
+
+
+def test_levers_disturb_turns_but_not_the_height_of_upright_hips(clips: Clips) -> None:
+    still = clips.select(np.array([False, False, False, False, True]))
+    off = replace(CONFIG, carried=replace(PLAIN, lever_m=0.1))
+    for episode in drawn(still, off, 10):
+        assert episode.x[:, -1] == pytest.approx(1.0, abs=1e-5)
+    walk = clips.select(np.array([False, True, False, False, False]))
+    for episode, plain in zip(drawn(walk, off, 10), drawn(walk, CONFIG, 10), strict=True):
+        assert len(episode) == len(plain)
+        assert np.abs(episode.x - plain.x)[:, :3].max() > 1e-4
 
 
 def test_a_lost_role_stands_still_and_does_not_jump(clips: Clips) -> None:
