@@ -1,17 +1,29 @@
-"""Where samples come from: a log (``--sim``) or drivers (``--driver``)."""
+"""Where samples come from: a log (``--sim``), drivers (``--driver``), or whatever is there."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import resources
 from pathlib import Path
 
 from lobstr_hw.drivers import DRIVERS, driver_class, load_driver, split_driver_spec
-from lobstr_hw.drivers.driver import TrackerDriver
-from lobstr_hw.errors import TrackerNotFound
+from lobstr_hw.drivers.driver import Probe, TrackerDriver
+from lobstr_hw.errors import DriverError, TrackerNotFound
 from lobstr_hw.runtime.many_drivers import ManyDrivers
+from lobstr_hw.runtime.part_driver import PartDriver
+from lobstr_hw.trackers import TrackerRole
 
-__all__ = ["bundled_log", "driver_from_spec", "drivers_from_specs", "joined", "nothing_to_run"]
+__all__ = [
+    "TAKEN_UNASKED",
+    "bundled_log",
+    "driver_from_spec",
+    "drivers_from_specs",
+    "joined",
+    "nothing_to_run",
+    "what_is_there",
+]
 
-RUNTIME_KEYS = ("role", "name")
+TAKEN_UNASKED = ("openvr", "lighthouse")
+"""In this order: where SteamVR runs it holds the hardware. All others have to be named, for they
+are open to anybody (vmc), or hold on to what may not be a tracker (serial ports)."""
 
 
 def bundled_log() -> Path:
@@ -23,42 +35,109 @@ def driver_from_spec(spec: str) -> TrackerDriver:
     """A driver from what the user wrote; not open yet.
 
     Raises:
-        ValueError: no such driver, or an option it does not know.
+        ValueError: no such driver or role, or an option it does not know.
     """
-    _, options = split_driver_spec(spec)
-    for key in RUNTIME_KEYS:
-        if key in options:
-            raise ValueError(f"{key}= in {spec!r} is not supported yet; bind roles by a profile")
-    return load_driver(spec)
+    name, options = split_driver_spec(spec)
+    driver = load_driver(spec)
+    if not {"role", "name"} & options.keys():
+        return driver
+    return PartDriver(driver, options.get("name", name), _role(options.get("role"), spec))
 
 
-def joined(drivers: Sequence[TrackerDriver]) -> TrackerDriver:
-    """One driver for all of them."""
-    return drivers[0] if len(drivers) == 1 else ManyDrivers(drivers)
+def _role(text: str | None, spec: str) -> TrackerRole | None:
+    if text is None:
+        return None
+    try:
+        return TrackerRole(text)
+    except ValueError as error:
+        roles = ", ".join(TrackerRole)
+        raise ValueError(f"role={text} in {spec!r} is not one of {roles}") from error
 
 
-def drivers_from_specs(specs: Sequence[str]) -> TrackerDriver:
+def joined(specs: Sequence[str]) -> TrackerDriver:
+    """One driver for all that the user named.
+
+    Raises:
+        ValueError: as in :func:`driver_from_spec`; or two have one name, or one role.
+    """
+    drivers = [driver_from_spec(spec) for spec in specs]
+    if len(drivers) == 1 and not isinstance(drivers[0], PartDriver):
+        return drivers[0]
+    parts = [
+        driver if isinstance(driver, PartDriver) else PartDriver(driver, spec.partition(":")[0])
+        for driver, spec in zip(drivers, specs, strict=True)
+    ]
+    names = [part.name for part in parts]
+    roles = [part.role for part in parts if part.role is not None]
+    for twice in {x for x in names if names.count(x) > 1}:
+        raise ValueError(f"two drivers are called {twice}; tell them apart: {twice}:name=...")
+    for twice in {x for x in roles if roles.count(x) > 1}:
+        raise ValueError(f"two drivers have role={twice}")
+    return ManyDrivers(parts)
+
+
+def drivers_from_specs(specs: Sequence[str], tell: Callable[[str], None]) -> TrackerDriver:
     """The drivers that the user named, as one; without any: what is there.
+
+    Args:
+        specs: as written, NAME[:key=value,...].
+        tell: is told what was taken unasked.
 
     Raises:
         ValueError: no such driver, or an option it does not know.
         TrackerNotFound: none was named, and nothing is there.
     """
-    if not specs:
-        raise nothing_to_run()
-    return joined([driver_from_spec(spec) for spec in specs])
+    return joined(specs) if specs else what_is_there(tell)
 
 
-def nothing_to_run() -> TrackerNotFound:
-    """Neither a log nor a driver was named: say what there is."""
-    rows = []
-    for name in sorted(DRIVERS):
-        probe = driver_class(name).probe()
-        rows.append(f"  {name}: " + ("ready" if probe.available else f"{probe.missing}"))
-        if probe.fix:
-            rows[-1] += f" ({probe.fix})"
+def what_is_there(tell: Callable[[str], None]) -> TrackerDriver:
+    """SteamVR when it runs, else Lighthouse hardware on USB; not open.
+
+    Raises:
+        TrackerNotFound: nothing; the message says what was looked for, and how to get each.
+    """
+    looked = {}
+    for name in TAKEN_UNASKED:
+        if name not in DRIVERS:
+            continue
+        looked[name] = _probe(name)
+        if looked[name].available:
+            driver = load_driver(name)
+            try:
+                with driver:  # whether SteamVR runs, only a session with it can tell
+                    pass
+            except DriverError as error:
+                looked[name] = Probe(False, str(error))
+                continue
+            tell(f"taking what is there: --driver {name}")
+            return driver
+    raise nothing_to_run(looked)
+
+
+def _probe(name: str) -> Probe:
+    try:
+        return driver_class(name).probe()
+    except Exception as error:  # a fault of one driver must not hide the others
+        return Probe(False, f"its driver failed ({type(error).__name__}: {error})")
+
+
+def nothing_to_run(looked: dict[str, Probe] | None = None) -> TrackerNotFound:
+    """Neither a log nor a driver was named: say what there is, and how to get the rest.
+
+    Args:
+        looked: the probes of drivers that were tried already.
+    """
+    looked = looked or {}
+    rows = [_row(name, looked.get(name) or _probe(name)) for name in sorted(DRIVERS)]
     return TrackerNotFound(
-        "no trackers to listen to: neither --sim nor --driver was given. Drivers here:\n"
+        "no trackers to listen to. Looked for:\n"
         + "\n".join(rows)
-        + "\nTry it without any device: lobstr-live --sim"
+        + "\nWhat is plugged in: lobstr-devices\nTry it without any device: lobstr-live --sim"
     )
+
+
+def _row(name: str, probe: Probe) -> str:
+    if not probe.available:
+        return f"  {name}: {probe.missing}" + (f" ({probe.fix})" if probe.fix else "")
+    unasked = name in TAKEN_UNASKED
+    return f"  {name}: ready" + ("" if unasked else f"; name it: --driver {name}")

@@ -140,14 +140,12 @@ def _run(args: argparse.Namespace, stop: Callable[[], bool]) -> int:
 
 def _driver(args: argparse.Namespace) -> "TrackerDriver | None":
     from lobstr_hw.drivers.replay import ReplayDriver
-    from lobstr_hw.runtime.sources import driver_from_spec, joined, nothing_to_run
+    from lobstr_hw.runtime.sources import drivers_from_specs
 
     if args.sim is not None:
         return ReplayDriver(args.sim)
-    if not args.driver:
-        raise nothing_to_run()
     try:
-        return joined([driver_from_spec(spec) for spec in args.driver])
+        return drivers_from_specs(args.driver, _tell)
     except ValueError as error:
         _tell(f"{error}")
         return None

@@ -148,14 +148,12 @@ def _run(args: argparse.Namespace, stop: StopRequest) -> int:
 
 def _driver(args: argparse.Namespace) -> "TrackerDriver | None":
     from lobstr_hw.drivers.replay import ReplayDriver
-    from lobstr_hw.runtime.sources import bundled_log, driver_from_spec, joined, nothing_to_run
+    from lobstr_hw.runtime.sources import bundled_log, drivers_from_specs
 
     if args.sim is not None:
         return ReplayDriver(bundled_log() if args.sim == BUNDLED else Path(args.sim))
-    if not args.driver:
-        raise nothing_to_run()
     try:
-        return joined([driver_from_spec(spec) for spec in args.driver])
+        return drivers_from_specs(args.driver, _tell)
     except ValueError as error:
         _tell(f"{error}")
         return None

@@ -101,7 +101,7 @@ def _run(args: argparse.Namespace, stop: StopRequest) -> int:
     if args.out.exists() and not args.force:
         raise OutputError(f"{args.out} exists. Choose another name, or replace it with --force.")
     try:
-        driver = drivers_from_specs(args.driver)
+        driver = drivers_from_specs(args.driver, _tell)
     except ValueError as error:
         _tell(f"{error}")
         return 2

@@ -18,6 +18,7 @@ from lobstr_hw.rotations import geodesic_angle
 from lobstr_hw.runtime.live import LiveOptions, LiveSession
 from lobstr_hw.runtime.many_drivers import ManyDrivers
 from lobstr_hw.runtime.outputs.sinks import parse_sink
+from lobstr_hw.runtime.part_driver import PartDriver
 from lobstr_hw.simulation import SimulatedTake, take_samples
 from lobstr_hw.skeleton import PARENTS, Body, Joint
 from lobstr_hw.skeleton_pose import SkeletonPose, Source
@@ -240,7 +241,9 @@ def test_parts_of_the_body_may_come_from_different_drivers(
         return write_log(path, take, lambda s: [x for x in s if (x.serial == pelvis) is keep])
 
     capture = Capture()
-    driver = ManyDrivers([ReplayDriver(only(False)), ReplayDriver(only(True))])
+    driver = ManyDrivers(
+        [PartDriver(ReplayDriver(only(keep)), f"{keep}") for keep in (False, True)]
+    )
     with LiveSession(driver, replace(QUICK, duration_s=3.5), print) as live:
         live.outputs.append(capture)
         live.run(lambda: False)

@@ -194,7 +194,7 @@ def test_wrong_use_is_exit_code_2(wrong: list[str], capsys: pytest.CaptureFixtur
     assert "usage: lobstr-live" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("driver", ["nosuch", "fake:colour=red", "replay", "fake:role=head"])
+@pytest.mark.parametrize("driver", ["nosuch", "fake:colour=red", "replay", "fake:role=nose"])
 def test_an_unknown_driver_or_option_is_wrong_use(
     driver: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
