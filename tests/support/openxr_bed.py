@@ -166,3 +166,12 @@ def running_openxr(manifest: Path, stage_file: Path) -> Iterator[OpenXR]:
     quiet = {"XR_LOADER_DEBUG": "none"}
     with environment(XR_RUNTIME_JSON=str(manifest), FAKE_OPENXR_STAGE=str(stage_file), **quiet):
         yield OpenXR(stage)
+        stage.refuse_instance = 0
+        _let_go()
+
+
+def _let_go() -> None:
+    """The loader keeps a runtime, and what it said it can do, until an instance of it ends."""
+    import xr
+
+    xr.destroy_instance(xr.create_instance(xr.InstanceCreateInfo(enabled_extension_names=[])))
