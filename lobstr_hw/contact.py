@@ -27,6 +27,8 @@ class LockSettings:
         off_probability: under this the lock opens.
         reach: share of the stretched leg (hip to toe base) beyond which it opens.
         distance_m: from the network's toe beyond which it opens.
+        close_within_m: from the network's toe within which it may close. Without it a foot let go
+            early is locked again in mid-blend, still far off, and never comes home.
         floor_within_m: a toe locked nearer than this to its height on the floor is brought there.
         floor_s: how long that takes at most.
         release_s: of the blend back to the network's toe (the paper's ten frames at 45 Hz).
@@ -37,6 +39,7 @@ class LockSettings:
     off_probability: float = 0.4
     reach: float = 0.99
     distance_m: float = 0.15
+    close_within_m: float = 0.05
     floor_within_m: float = 0.03
     floor_s: float = 0.1
     release_s: float = 10.0 / 45.0
@@ -140,6 +143,7 @@ def release(
 def follow(
     lock: ContactLock,
     target: Array,
+    toe: Array,
     opens: Bools,
     allowed: Bools,
     dt_s: Array,
@@ -153,6 +157,7 @@ def follow(
     Args:
         lock: the state at the last tick.
         target: toe bases as shown at this tick (n, 2, 3).
+        toe: the network's toe bases (n, 2, 3).
         opens: of :func:`release`.
         allowed: (n, 2) where a lock may close.
         dt_s: time since the last tick (n, 1).
@@ -160,7 +165,8 @@ def follow(
         settings: of the lock.
     """
     stays = lock.on & ~opens
-    closes = ~lock.on & (lock.steps >= settings.on_steps) & allowed
+    at_home = length(target - toe)[..., 0] < settings.close_within_m
+    closes = ~lock.on & (lock.steps >= settings.on_steps) & allowed & at_home
     gap = np.abs(floor_y - target[..., 1])
     near = gap < settings.floor_within_m
     return ContactLock(

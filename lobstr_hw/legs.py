@@ -94,7 +94,7 @@ def pose_legs(
     target, crowded = clear_of_hip(target, R_foot, p_hip, body)
     opens = release(lock, held, toe, p_hip, contact, body.reach_m, has_tracker, settings)
     opens |= lock.on & crowded
-    lock = follow(lock, target, opens, ~has_tracker, dt_s, body.shape.ball_m, settings)
+    lock = follow(lock, target, toe, opens, ~has_tracker, dt_s, body.shape.ball_m, settings)
     pose = solve_legs(LegPose(network.upper, network.lower, R_foot), p_hip, body.bones, target)
     reached = pose.toe(p_hip, body.bones)
     return lock, pose, toes_on_floor(reached, pose.foot, body.shape)
