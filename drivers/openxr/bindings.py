@@ -4,7 +4,15 @@ from collections.abc import Iterator, Mapping
 
 from lobstr_hw.trackers import TrackerRole
 
-__all__ = ["BUTTONS", "HANDS", "TRACKERS", "VIVE_TRACKER_PROFILE", "bindings_of", "profiles"]
+__all__ = [
+    "BUTTONS",
+    "HANDS",
+    "TRACKERS",
+    "VIVE_TRACKER_PROFILE",
+    "bindings_of",
+    "profiles",
+    "tracker_bindings",
+]
 
 HANDS: Mapping[TrackerRole, str] = {
     TrackerRole.LEFT_HAND: "/user/hand/left",
