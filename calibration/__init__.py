@@ -1,4 +1,4 @@
-"""From a T-pose and movement to tracker offsets and body measures: pure functions and the profile file."""
+"""From a T-pose and movement to offsets and body measures: pure functions, and the profile."""
 
 from lobstr_hw.calibration.calibration import Calibration, Residuals
 from lobstr_hw.calibration.from_t_pose import calibrate_t_pose

@@ -68,6 +68,8 @@ class Measures:
         stature_m, hips_height_m, trunk_m, arm_m, shoulders_m: see ``body_from_measures``.
         levers: (4, 3) from joint to tracker, in the joint's frame; FOUR_POINTS.
         lever_deviation: (4, 3) how far off these may be.
+        arms_rad: (2, 2) each arm in the T-pose: up, forward; left first.
+        leg: of the hips' height, by what share it is off that of people of this stature.
         hips_height_deviation_m: how far off the hips' height may be.
         arm_deviation_m: how far off the arms may be.
         misfit: root mean square of all residuals over their deviations; above 2 something is odd.
@@ -80,6 +82,8 @@ class Measures:
     shoulders_m: float
     levers: Array
     lever_deviation: Array
+    arms_rad: Array
+    leg: float
     hips_height_deviation_m: float
     arm_deviation_m: float
     misfit: float
@@ -88,6 +92,7 @@ class Measures:
         """Check the shape once."""
         object.__setattr__(self, "levers", frozen(self.levers, (4, 3)))
         object.__setattr__(self, "lever_deviation", frozen(self.lever_deviation, (4, 3)))
+        object.__setattr__(self, "arms_rad", frozen(self.arms_rad, (2, 2)))
 
     def body(self) -> Body:
         """The body of these measures (n = 1)."""
@@ -243,6 +248,8 @@ def _measures(x: Array, covariance: Array, misfit: float) -> Measures:
         shoulders,
         levers,
         np.sqrt(np.diag(C)[_LEVERS]).reshape(4, 3),
+        np.array(x[_ARMS]).reshape(2, 2),
+        float(x[1]),
         float(np.sqrt(by_hips @ C[:2, :2] @ by_hips)),
         float(np.sqrt(by_arm @ C[np.ix_([0, 2], [0, 2])] @ by_arm)),
         misfit,

@@ -25,7 +25,7 @@ from lobstr_hw.calibration.orientation import (
 from lobstr_hw.calibration.phases import Phases, tell_phases
 from lobstr_hw.calibration.recording import RATE_HZ, Movement
 from lobstr_hw.calibration.t_pose import TPose
-from lobstr_hw.rotations import Array, rotation_y, transpose
+from lobstr_hw.rotations import Array, geodesic_angle, rotation_y, transpose
 from lobstr_hw.trackers import FOUR_POINTS
 
 __all__ = ["Quantity", "Refinement", "refine_by_movement"]
@@ -65,10 +65,14 @@ class Refinement:
     Attributes:
         calibration: to be used.
         quantities: each with its deviation before and after.
+        measures: of the body and the mounts.
+        held_rad: (4,) how far each joint was off the ideal T-pose.
     """
 
     calibration: Calibration
     quantities: tuple[Quantity, ...]
+    measures: Measures
+    held_rad: Array
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -122,7 +126,8 @@ def refine_by_movement(
             told |= more
             fit = _measured(pose, orientations, levers, stature_m, floor_m)
     calibration = _calibration(pose, fit, floor_m, created)
-    return Refinement(calibration, _quantities(before, fit, told))
+    held = geodesic_angle(_held(pose, fit.orientations), np.eye(3))
+    return Refinement(calibration, _quantities(before, fit, told), fit.measures, held)
 
 
 def _oriented(pose: TPose, evidence: Sequence[Direction | Place]) -> Orientations:

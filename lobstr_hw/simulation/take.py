@@ -110,6 +110,7 @@ def simulate(
     pose_deviation_deg: float = 10.0,
     sway: Sway | None = None,
     t_pose_s: float = T_POSE_S,
+    t_pose: Motion | None = None,
 ) -> SimulatedTake:
     """Strap trackers on someone who does a T-pose and then this motion.
 
@@ -128,14 +129,18 @@ def simulate(
         pose_deviation_deg: the most that a segment stands off the ideal T-pose.
         sway: of the T-pose; a person's where None.
         t_pose_s: how long the T-pose is held; 0 leaves it out.
+        t_pose: this one instead of a drawn one, at the motion's rate.
     """
     who = drawn_user(seed, height_cm, mount_seed=mount_seed) if user is None else user
     whole = motion
-    if t_pose_s > 0.0:
+    if t_pose is not None:
+        t_pose_s = t_pose.duration_s
+        whole = joined([t_pose, motion])
+    elif t_pose_s > 0.0:
         rng = np.random.default_rng([seed, 4])
         deviation = PoseDeviation.drawn(rng, np.deg2rad(pose_deviation_deg))
-        t_pose = t_pose_motion(t_pose_s, motion.rate_hz, deviation, sway or Sway(), rng)
-        whole = joined([t_pose, motion])
+        drawn = t_pose_motion(t_pose_s, motion.rate_hz, deviation, sway or Sway(), rng)
+        whole = joined([drawn, motion])
     truth_p, truth_R = _worn(whole, who)
     times = np.arange(int(whole.duration_s * rate_hz + 1e-9) + 1) / rate_hz
     p, R = _sampled(truth_p[:, _JOINTS], truth_R[:, _JOINTS], times * whole.rate_hz)
