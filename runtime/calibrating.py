@@ -13,14 +13,16 @@ __all__ = ["TPoseWatcher"]
 class TPoseWatcher:
     """Shown the samples of every tick; returns a calibration once someone stands in a T-pose."""
 
-    def __init__(self, table: RoleTable) -> None:
+    def __init__(self, table: RoleTable, floor_m: float = 0.0) -> None:
         """Begin with nothing seen.
 
         Args:
             table: what is known of roles; trackers without one are told apart by where they are.
+            floor_m: height of the floor in the tracking space.
         """
         self._table = table
-        self._detector = TPoseDetector()
+        self._floor_m = floor_m
+        self._detector = TPoseDetector(floor_m=floor_m)
 
     def __call__(self, samples: Sequence[TrackerSample]) -> Calibration | None:
         """Look at new samples, oldest first."""
@@ -30,7 +32,7 @@ class TPoseWatcher:
                 if role is not None:
                     self._detector.hints[sample.serial] = role
         pose = self._detector.add(samples)
-        return None if pose is None else calibrate_t_pose(pose)
+        return None if pose is None else calibrate_t_pose(pose, floor_m=self._floor_m)
 
     def failure(self) -> CalibrationError:
         """Why there is no calibration at the end of a log, and what to do."""

@@ -12,6 +12,7 @@ from lobstr_hw.errors import OutputError
 from lobstr_hw.predictors import load_predictor
 from lobstr_hw.runtime.calibrating import TPoseWatcher
 from lobstr_hw.runtime.clock import Clock, HostClock
+from lobstr_hw.runtime.controls import Controls, Say
 from lobstr_hw.runtime.feed import Feed
 from lobstr_hw.runtime.loop import run
 from lobstr_hw.runtime.outputs.output import Output
@@ -74,7 +75,12 @@ class LiveSession:
     """
 
     def __init__(
-        self, driver: TrackerDriver, options: LiveOptions, tell: Tell, clock: Clock | None = None
+        self,
+        driver: TrackerDriver,
+        options: LiveOptions,
+        tell: Tell,
+        clock: Clock | None = None,
+        say: Say | None = None,
     ) -> None:
         """Get ready; nothing is opened before ``with``.
 
@@ -83,10 +89,12 @@ class LiveSession:
             options: what the user asked for.
             tell: is given each message for the user.
             clock: for tests; the machine's otherwise.
+            say: is given what somebody in a headset should hear; nobody listens if None.
         """
         self.driver = driver
         self.options = options
         self.tell = tell
+        self.say: Say = say or (lambda spoken: None)
         self.clock = clock or HostClock()
         self.outputs: list[Output] = []
         self._queues: list[QueuedOutput] = []
@@ -125,6 +133,7 @@ class LiveSession:
         )
         if isinstance(self.driver, ReplayDriver):
             self._check_log(self.driver)
+        self.controls = Controls(self.driver, self.session, self.feed, self.say)
         grid = Grid(options.rate_hz, predictor.card.rate_hz, 0.0, options.input_delay_s)
         self.ticks = Ticks(
             options.rate_hz, grid, 0.0, self.clock, paced=not options.fast, last=self._last_tick()
@@ -186,7 +195,15 @@ class LiveSession:
         """
         self.ticks.stop = stop
         with StatusLine(self.snapshot, self.options.quiet), _undisturbed():
-            run(self.driver, self.feed, self.session, self.outputs, self.ticks, self._observe)
+            run(
+                self.driver,
+                self.feed,
+                self.session,
+                self.outputs,
+                self.ticks,
+                self._observe,
+                self.controls,
+            )
         log_ended = isinstance(self.driver, ReplayDriver) and self.driver.finished(
             self.tally.last_s + 1.0 / self.options.rate_hz
         )

@@ -7,8 +7,11 @@ import numpy as np
 
 from lobstr_hw.avatar import Avatar
 from lobstr_hw.calibration.calibration import Calibration
+from lobstr_hw.errors import CalibrationError
 from lobstr_hw.predictors.predictor import Frame, Predictor, State
+from lobstr_hw.runtime.changing import Change
 from lobstr_hw.runtime.feed import Feed
+from lobstr_hw.runtime.presenting import Presentation
 from lobstr_hw.runtime.standing import standing_pose
 from lobstr_hw.runtime.ticks import Tick
 from lobstr_hw.skeleton import Body
@@ -31,6 +34,7 @@ class Session:
     Attributes:
         body: the user's sizes; the standard body before the first calibration.
         calibration: None before the first.
+        presentation: what is shown instead of the body as computed (frozen, seated).
         nonfinite_frames: poses that were not finite and were replaced by the last good one.
     """
 
@@ -58,6 +62,8 @@ class Session:
         self.nonfinite_frames = 0
         self._bad_in_a_row = 0
         self._watch = watch
+        self.presentation = Presentation()
+        self._change: Change | None = None
         self.calibration: Calibration | None = None
         self._good: SkeletonPose | None = None
         if calibration is not None:
@@ -82,6 +88,34 @@ class Session:
             self._begin(found)
         return found is not None
 
+    @property
+    def aim(self) -> Calibration:
+        """The calibration in use, or the one that it is changing into.
+
+        Raises:
+            CalibrationError: there is none yet.
+        """
+        if self.calibration is None:
+            raise CalibrationError("not calibrated yet: hold a T-pose.")
+        return self.calibration if self._change is None else self._change.new
+
+    def adjust(self, calibration: Calibration, now_s: float) -> None:
+        """Change to other offsets, smoothly; the body stays as it is.
+
+        Raises:
+            CalibrationError: there is no calibration yet.
+        """
+        old = self.aim if self._change is None else self._change.at(now_s)
+        self._change = Change(old, calibration, now_s)
+
+    def _changed(self, now_s: float) -> Calibration | None:
+        """The calibration at a time."""
+        if self._change is not None:
+            self.calibration = self._change.at(now_s)
+            if self._change.over(now_s):
+                self._change = None
+        return self.calibration
+
     def _begin(self, calibration: Calibration) -> None:
         self.calibration = calibration
         self.body = calibration.body
@@ -96,11 +130,13 @@ class Session:
     def step(self, tick: Tick, feed: Feed) -> SkeletonPose:
         """The body at a tick: standing still until the user is calibrated and seen."""
         roles = feed.report(tick.time_s)
-        if self.calibration is None or not feed.seen(self.predictor.card.needs):
+        calibration = self._changed(tick.time_s)
+        if calibration is None or not feed.seen(self.predictor.card.needs):
             return standing_pose(tick.time_s, feed.head(tick.time_s), self.body, roles)
-        frame, *grid = self._frames(self.calibration, tick, feed)
+        frame, *grid = self._frames(calibration, tick, feed)
         state, pose = self._avatar.step(self._state, frame, grid)
-        return self._finite(state, replace(pose, roles=roles))
+        pose = self._finite(state, replace(pose, roles=roles))
+        return self.presentation.show(pose, self.body)
 
     def _frames(self, calibration: Calibration, tick: Tick, feed: Feed) -> list[Frame]:
         """Joint poses at the tick's time, then at the grid times due by it."""

@@ -3,7 +3,8 @@
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from lobstr_hw.runtime.stopping import StopRequest
 
 if TYPE_CHECKING:
     from lobstr_hw.drivers.driver import TrackerDriver
+    from lobstr_hw.runtime.controls import Say
     from lobstr_hw.runtime.live import LiveOptions
     from lobstr_hw.runtime.summary import Summary
 
@@ -79,6 +81,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--take", metavar="NAME", help="name of this recording")
     add("--duration", type=_positive, metavar="S", help="seconds from the first frame")
     add("--summary", type=Path, metavar="FILE", help="write a JSON summary at the end")
+    add("--no-speech", action="store_true", help="bells only, no words for somebody in a headset")
     add("--quiet", action="store_true", help="no status line and no closing words")
     add("--json", action="store_true", help="the summary on stdout, as one JSON document")
     return parser
@@ -135,7 +138,7 @@ def _run(args: argparse.Namespace, stop: StopRequest) -> int:
     driver = _driver(args)
     if driver is None:
         return 2
-    with LiveSession(driver, _options(args), _tell) as live:
+    with _voice(args) as say, LiveSession(driver, _options(args), _tell, say=say) as live:
         try:
             live.run(stop)
         finally:
@@ -157,6 +160,24 @@ def _driver(args: argparse.Namespace) -> "TrackerDriver | None":
     except ValueError as error:
         _tell(f"{error}")
         return None
+
+
+@contextmanager
+def _voice(args: argparse.Namespace) -> "Iterator[Say | None]":
+    """Who tells somebody in a headset; with --fast there is nobody in one."""
+    from lobstr_hw.runtime.announcer import Announcer, Spoken
+
+    if args.fast:
+        yield None
+        return
+    with Announcer(speech=not args.no_speech) as announcer:
+
+        def say(spoken: Spoken) -> None:
+            announcer.say(spoken)
+            if not args.quiet:
+                _tell(spoken.text)
+
+        yield say
 
 
 def _options(args: argparse.Namespace) -> "LiveOptions":
