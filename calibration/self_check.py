@@ -12,7 +12,7 @@ from lobstr_hw.trackers import FOUR_POINTS
 
 __all__ = ["SelfCheck", "self_check"]
 
-BEFORE_S, AFTER_S = 0.5, 0.7
+BEFORE_S, AFTER_S = 0.7, 0.9
 """Around the T-pose's window, looked at for trackers that slip; the pose is held that long."""
 _FROZEN_M = 2e-6
 
@@ -45,8 +45,8 @@ def self_check(pose: TPose, recording: Movement, refinement: Refinement) -> Self
 
     Args:
         pose: the T-pose that it was made from.
-        recording: all four trackers from half a second before the pose to the end of the movement;
-            without movement, to 0.7 s after the pose.
+        recording: all four trackers from 0.7 s before the pose to the end of the movement; without
+            movement, to 0.9 s after the pose.
         refinement: what came of it.
     """
     return SelfCheck(

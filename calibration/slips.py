@@ -39,18 +39,18 @@ def steps_of(pose: Movement) -> Step:
     Args:
         pose: the trackers while somebody stands still.
     """
-    p = _without_excursions(pose.p.reshape(len(pose), 12)).reshape(-1, 4, 3)
-    mean = rotation_mean(pose.R) if len(pose) else np.eye(3)
-    turned = to_rotation_vector(transpose(mean) @ pose.R)
-    w = _without_excursions(turned.reshape(len(pose), 12)).reshape(-1, 4, 3)
-    count = len(pose) - 2 * _SIDE - _GAP + 1
+    count = len(pose) - 2 * (_SIDE + _EXCURSION) - _GAP + 1
     if count < 1:
         return Step(np.zeros(4), np.zeros(4), np.zeros(4))
-    off = [np.linalg.norm(_disagreement(values, count), axis=-1) for values in (p, w)]  # (count, 4)
+    turned = to_rotation_vector(transpose(rotation_mean(pose.R)) @ pose.R)
+    off = [
+        np.linalg.norm(_disagreement(_without_excursions(values), count), axis=-1)
+        for values in (pose.p, turned)
+    ]  # (count, 4)
     # a person who moves takes more than one tracker along
     alone = [step * (_third(step) < 0.5 * step) for step in off]
     at = np.argmax(alone[0] / 0.03 + alone[1] / 0.17, axis=0)
-    times = pose.times_s[at + _SIDE + _GAP // 2]
+    times = pose.times_s[at + _EXCURSION + _SIDE + _GAP // 2]
     return Step(np.max(alone[0], axis=0), np.max(alone[1], axis=0), times)
 
 
@@ -60,13 +60,9 @@ def _third(values: Array) -> Array:
 
 
 def _without_excursions(values: Array) -> Array:
-    """A running median over twice the excursion, shorter at the ends: (m, c) -> (m, c)."""
-    m = len(values)
-    out = np.array(values)
-    for i in range(m):
-        reach = min(_EXCURSION, i, m - 1 - i)
-        out[i] = np.median(values[i - reach : i + reach + 1], axis=0)
-    return out
+    """A running median over twice the excursion; (m, ...) -> (m - 2 * excursion, ...)."""
+    windows = np.lib.stride_tricks.sliding_window_view(values, 2 * _EXCURSION + 1, axis=0)
+    return np.asarray(np.median(windows, axis=-1))
 
 
 def _disagreement(values: Array, count: int) -> Array:
