@@ -8,7 +8,7 @@ from typing import Self
 
 from lobstr_hw.trackers import TrackerRole, TrackerSample
 
-__all__ = ["DeviceEvent", "DeviceInfo", "EventKind", "Probe", "TrackerDriver"]
+__all__ = ["BASE_STATION", "DeviceEvent", "DeviceInfo", "EventKind", "Probe", "TrackerDriver"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +18,10 @@ class Probe:
     available: bool
     missing: str = ""
     fix: str = ""
+
+
+BASE_STATION = "base_station"
+"""The kind of a device that others measure themselves by: it is listed and gives no samples."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,12 +3,10 @@
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
-from lobstr_hw.drivers.driver import DeviceEvent, DeviceInfo, TrackerDriver
+from lobstr_hw.drivers.driver import BASE_STATION, DeviceEvent, DeviceInfo, TrackerDriver
 from lobstr_hw.trackers import TrackerRole, TrackerSample
 
 __all__ = ["PartDriver"]
-
-BASE_STATION = "base_station"
 
 
 class PartDriver(TrackerDriver):

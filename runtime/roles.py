@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 
-from lobstr_hw.drivers.driver import DeviceInfo
+from lobstr_hw.drivers.driver import BASE_STATION, DeviceInfo
 from lobstr_hw.errors import MissingRole
 from lobstr_hw.trackers import TrackerRole
 
@@ -48,7 +48,7 @@ class RoleTable:
         Raises:
             MissingRole: names what is missing and what was seen.
         """
-        devices = self._devices()
+        devices = [d for d in self._devices() if d.kind != BASE_STATION]
         bound = {device.serial: self.of(device.serial) for device in devices}
         missing = [role for role in roles if role not in bound.values()]
         open_to_any = 0 if self._fixed else list(bound.values()).count(None)

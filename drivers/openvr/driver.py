@@ -6,7 +6,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lobstr_hw.drivers.chosen_roles import ROLE_OPTIONS, by_serial
-from lobstr_hw.drivers.driver import DeviceEvent, DeviceInfo, EventKind, Probe, TrackerDriver
+from lobstr_hw.drivers.driver import (
+    BASE_STATION,
+    DeviceEvent,
+    DeviceInfo,
+    EventKind,
+    Probe,
+    TrackerDriver,
+)
 from lobstr_hw.drivers.openvr.buttons import button_name
 from lobstr_hw.drivers.openvr.devices import DeviceReader
 from lobstr_hw.drivers.openvr.init_errors import translated
@@ -28,7 +35,6 @@ LIBRARY = ("openvr", "openvr", "openvr")
 """Module, package, extra."""
 
 NO_RUNTIME = Probe(False, "SteamVR", "install Steam and SteamVR, start SteamVR once")
-BASE_STATION = "base_station"
 
 
 class OpenVRDriver(TrackerDriver):

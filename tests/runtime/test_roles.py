@@ -1,6 +1,6 @@
 import pytest
 
-from lobstr_hw.drivers.driver import DeviceInfo
+from lobstr_hw.drivers.driver import BASE_STATION, DeviceInfo
 from lobstr_hw.errors import MissingRole
 from lobstr_hw.runtime.roles import RoleTable
 from lobstr_hw.trackers import FOUR_POINTS, TrackerRole
@@ -44,3 +44,9 @@ def test_before_a_calibration_a_device_without_a_name_may_be_what_is_missing() -
     RoleTable(None, lambda: seen).require(FOUR_POINTS)
     with pytest.raises(MissingRole, match="pelvis"):
         RoleTable({"A": HEAD, "B": LEFT, "C": RIGHT}, lambda: seen).require(FOUR_POINTS)
+
+
+def test_a_base_station_stands_for_nobody() -> None:
+    seen = [*devices(A=HEAD, B=LEFT, C=RIGHT), DeviceInfo("LHB-1", BASE_STATION)]
+    with pytest.raises(MissingRole, match="pelvis"):
+        RoleTable(None, lambda: seen).require(FOUR_POINTS)
