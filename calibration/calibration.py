@@ -12,7 +12,7 @@ from lobstr_hw.rotations import Array
 from lobstr_hw.skeleton import Body, Joint
 from lobstr_hw.trackers import TrackerRole
 
-__all__ = ["Calibration", "Residuals"]
+__all__ = ["Calibration", "Residuals", "TrackingSpace"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,23 @@ class Residuals:
     arm_deviation_m: float = 0.0
 
 
-def _no_spaces() -> Mapping[str, Pose]:
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackingSpace:
+    """Where one driver's tracking space lies in the world, and how its clock does.
+
+    Attributes:
+        T_world_space: from that space to the world.
+        delay_s: by how much later than the world's this driver stamps the same moment.
+        residual_m, residual_rad: of the fit.
+    """
+
+    T_world_space: Pose = field(default_factory=Pose.identity)
+    delay_s: float = 0.0
+    residual_m: float = 0.0
+    residual_rad: float = 0.0
+
+
+def _no_spaces() -> Mapping[str, TrackingSpace]:
     return MappingProxyType({})
 
 
@@ -51,7 +67,7 @@ class Calibration:
         floor_m: height of the floor in the tracking space.
         heading_rad: where the user faced in the T-pose.
         residuals: how well it all fits.
-        tracking_spaces: T_world_space by driver, for parts tracked by different systems.
+        tracking_spaces: by driver, for parts of the body tracked by different systems.
         created: when it was made, in the caller's words.
     """
 
@@ -63,7 +79,7 @@ class Calibration:
     floor_m: float = 0.0
     heading_rad: float = 0.0
     residuals: Residuals = Residuals()
-    tracking_spaces: Mapping[str, Pose] = field(default_factory=_no_spaces)
+    tracking_spaces: Mapping[str, TrackingSpace] = field(default_factory=_no_spaces)
     created: str = ""
 
     def __post_init__(self) -> None:

@@ -9,6 +9,8 @@ the robot-world/hand-eye calibration problem using the Kronecker product", secti
 positions, which are linear.
 """
 
+import math
+
 import numpy as np
 
 from lobstr_hw.rotations import Array, rotation_mean, transpose
@@ -60,5 +62,5 @@ def wobble(R: Array) -> float:
     same residual whenever dX = R dY for all R; the information on them is 1 - s, with s the largest
     singular value of the mean rotation, and s falls from 1 by half of the mean squared angle.
     """
-    largest = np.linalg.norm(np.mean(R, axis=0), ord=2)
-    return float(np.sqrt(2.0 * max(0.0, 1.0 - largest)))
+    largest = float(np.linalg.svd(np.mean(R, axis=0), compute_uv=False)[0])
+    return math.sqrt(2.0 * max(0.0, 1.0 - largest))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from lobstr_hw.calibration.calibration import Calibration, Residuals
+from lobstr_hw.calibration.calibration import Calibration, Residuals, TrackingSpace
 from lobstr_hw.errors import ProfileError
 from lobstr_hw.poses import Pose
 from lobstr_hw.rotations import Array, from_quat_xyzw, to_quat_xyzw
@@ -38,10 +38,7 @@ def profile_to_json(calibration: Calibration) -> str:
         for i, (serial, role) in enumerate(calibration.roles.items())
     }
     body = calibration.body
-    spaces = {
-        driver: {"position_m": T.p.tolist(), "quat_xyzw": to_quat_xyzw(T.R).tolist()}
-        for driver, T in calibration.tracking_spaces.items()
-    }
+    spaces = {name: _space(space) for name, space in calibration.tracking_spaces.items()}
     document = {
         "format": FORMAT,
         "created": calibration.created,
@@ -58,6 +55,16 @@ def profile_to_json(calibration: Calibration) -> str:
         "residuals": asdict(calibration.residuals),
     }
     return json.dumps(document, indent=2) + "\n"
+
+
+def _space(space: TrackingSpace) -> dict[str, Any]:
+    return {
+        "position_m": space.T_world_space.p.tolist(),
+        "quat_xyzw": to_quat_xyzw(space.T_world_space.R).tolist(),
+        "delay_s": space.delay_s,
+        "residual_m": space.residual_m,
+        "residual_rad": space.residual_rad,
+    }
 
 
 def save_profile(path: Path | str, calibration: Calibration) -> None:
@@ -149,13 +156,19 @@ def profile_from_json(text: str, name: str = "profile") -> Calibration:
             **{field: reader.number("residuals", field) for field in Residuals.__slots__}
         ),
         tracking_spaces={
-            driver: Pose(
-                reader.rotation("tracking_spaces", driver, "quat_xyzw"),
-                reader.numbers("tracking_spaces", driver, "position_m", n=3),
-            )
-            for driver in reader.mapping("tracking_spaces")
+            name: _read_space(reader, "tracking_spaces", name)
+            for name in reader.mapping("tracking_spaces")
         },
         created=str(reader.value("created")),
+    )
+
+
+def _read_space(reader: "_Reader", *keys: str) -> TrackingSpace:
+    return TrackingSpace(
+        Pose(reader.rotation(*keys, "quat_xyzw"), reader.numbers(*keys, "position_m", n=3)),
+        reader.number(*keys, "delay_s"),
+        reader.number(*keys, "residual_m"),
+        reader.number(*keys, "residual_rad"),
     )
 
 

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lobstr_hw.calibration.track import Track, usable
 from lobstr_hw.poses import frozen
 from lobstr_hw.predictors.predictor import Bools
-from lobstr_hw.rotations import Array, slerp
+from lobstr_hw.rotations import Array
 from lobstr_hw.trackers import TrackerSample
 
 __all__ = ["Movement", "movement_from_samples"]
 
 RATE_HZ = 45.0
-_LONGEST_GAP_S = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,39 +65,17 @@ def movement_from_samples(
     """
     kept: dict[str, list[TrackerSample]] = {serial: [] for serial in serials}
     for sample in samples:
-        if sample.serial in kept and start_s <= sample.time_s <= end_s and _usable(sample):
+        if sample.serial in kept and start_s <= sample.time_s <= end_s and usable(sample):
             kept[sample.serial].append(sample)
     if min(len(own) for own in kept.values()) < 2:
         return Movement(np.empty(0), np.empty((0, 4, 3)), np.empty((0, 4, 3, 3)), _none())
     begin = max(own[0].time_s for own in kept.values())
     end = min(own[-1].time_s for own in kept.values())
     times = np.arange(begin, max(end, begin), 1.0 / RATE_HZ)
-    tracks = [_track(kept[serial], times) for serial in serials]
+    tracks = [Track.of(kept[serial]).at(times) for serial in serials]
     p, R, tracked = (np.stack(values, axis=1) for values in zip(*tracks, strict=True))
     return Movement(times, p, R, tracked)
 
 
 def _none() -> Bools:
     return np.empty((0, 4), dtype=bool)
-
-
-def _usable(sample: TrackerSample) -> bool:
-    pose = sample.T_world_tracker
-    return bool(
-        sample.tracked
-        and pose.p is not None
-        and np.isfinite(pose.p).all()
-        and np.isfinite(pose.R).all()
-    )
-
-
-def _track(samples: Sequence[TrackerSample], times: Array) -> tuple[Array, Array, Bools]:
-    """One tracker's p (m, 3), R (m, 3, 3) and whether it was seen (m) at times within its own."""
-    own = np.array([sample.time_s for sample in samples])
-    p = np.array([sample.T_world_tracker.p for sample in samples])
-    R = np.array([sample.T_world_tracker.R for sample in samples])
-    j = np.clip(np.searchsorted(own, times, side="right"), 1, len(own) - 1)
-    gap = own[j] - own[j - 1]
-    f = np.clip((times - own[j - 1]) / np.maximum(gap, 1e-9), 0.0, 1.0)
-    between = p[j - 1] + f[:, None] * (p[j] - p[j - 1])
-    return between, slerp(R[j - 1], R[j], f), gap <= _LONGEST_GAP_S

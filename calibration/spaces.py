@@ -25,7 +25,8 @@ MOST_DELAY_S = 0.25
 NEAR_S = 0.015
 GRID_HZ = 100.0
 SPEED_S = 0.04
-PAIRS = 600
+PAIRS = 300
+"""Moments that the delay is found with; all of them give the rest."""
 LEVER_M = 0.5
 """An error of rotation weighs as the shift that it makes half a metre away."""
 OUTLIER = 3.0
@@ -97,6 +98,7 @@ def align_spaces(
     step = max(1, len(a) // PAIRS)
     few = Track(a.times_s[::step], a.p[::step], a.R[::step])
     _check_turning(few)
+    _check_turning(b)
     coarse_s = _coarse_delay(a, b)
     delay_s = _minimum(lambda d: _misfit(few, b, d), coarse_s - NEAR_S, coarse_s + NEAR_S)
     fit = _fit(a, b, delay_s)
@@ -133,11 +135,15 @@ def _coarse_delay(a: Track, b: Track) -> float:
             f"both were seen for {max(0.0, end - start):.1f} s, {LEAST_S:g} are needed: go on "
             "moving them in sight of both systems."
         )
-    times = np.arange(start + MOST_DELAY_S, end - MOST_DELAY_S, 1.0 / GRID_HZ)
-    speed_a = _speed(a, times)
-    shifts = np.arange(-MOST_DELAY_S, MOST_DELAY_S + 1e-9, 1.0 / GRID_HZ)
-    likeness = [np.corrcoef(speed_a, _speed(b, times + shift))[0, 1] for shift in shifts]
-    return float(shifts[int(np.argmax(likeness))])
+    times = np.arange(start, end, 1.0 / GRID_HZ)
+    speed_a, speed_b = _speed(a, times), _speed(b, times)
+    most = int(MOST_DELAY_S * GRID_HZ)
+    middle = speed_a[most : len(times) - most]
+    likeness = [
+        np.corrcoef(middle, speed_b[shift : shift + len(middle)])[0, 1]
+        for shift in range(2 * most + 1)
+    ]
+    return float(np.argmax(likeness) - most) / GRID_HZ
 
 
 def _speed(track: Track, times_s: Array) -> Array:

@@ -8,6 +8,7 @@ LobstrError
 ├── CalibrationError
 │   ├── TPoseNotFound        nobody stood still in a T-pose
 │   ├── MissingRole          a role that is needed has no tracker
+│   ├── SpacesNotJoined      how two tracking spaces lie to each other cannot be told
 │   └── ProfileError         a calibration profile cannot be used
 ├── FileFormatError
 │   ├── MotionFileError      a motion clip (BVH) cannot be read
@@ -32,6 +33,7 @@ __all__ = [
     "MotionFileError",
     "OutputError",
     "ProfileError",
+    "SpacesNotJoined",
     "TPoseNotFound",
     "TrackerNotFound",
     "UnknownRig",
@@ -72,6 +74,10 @@ class MissingRole(CalibrationError):
 
 class ProfileError(CalibrationError):
     """A calibration profile cannot be used."""
+
+
+class SpacesNotJoined(CalibrationError):
+    """How two tracking spaces lie to each other cannot be told."""
 
 
 class FileFormatError(LobstrError):

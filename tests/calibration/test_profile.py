@@ -1,6 +1,7 @@
 """The profile: there and back, whole or not at all, and faults told by their key."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,11 @@ from support.calibrations import calibrated
 from support.motions import walking
 
 from lobstr_hw.calibration import Calibration, load_profile, save_profile
+from lobstr_hw.calibration.calibration import TrackingSpace
 from lobstr_hw.calibration.profile import profile_from_json, profile_to_json
 from lobstr_hw.errors import ProfileError
+from lobstr_hw.poses import Pose
+from lobstr_hw.rotations import rotation_y
 from lobstr_hw.simulation import simulate
 
 
@@ -41,6 +45,19 @@ def test_loading_and_saving_again_changes_nothing(calibration: Calibration) -> N
     twice = profile_from_json(profile_to_json(once))
     np.testing.assert_allclose(once.R_tracker_joint, twice.R_tracker_joint, atol=1e-15)
     assert once.residuals == twice.residuals
+
+
+def test_tracking_spaces_are_kept_by_name(calibration: Calibration, tmp_path: Path) -> None:
+    T = Pose(rotation_y(0.7), np.array([1.0, 0.2, -3.0]))
+    spaces = {"openvr": TrackingSpace(), "belt": TrackingSpace(T, -0.004, 0.003, 0.01)}
+    save_profile(tmp_path / "p.json", replace(calibration, tracking_spaces=spaces))
+    loaded = load_profile(tmp_path / "p.json").tracking_spaces
+    assert list(loaded) == ["openvr", "belt"]
+    np.testing.assert_allclose(loaded["belt"].T_world_space.R, T.R, atol=1e-15)
+    np.testing.assert_array_equal(loaded["belt"].T_world_space.p, T.p)
+    assert loaded["belt"].delay_s == -0.004
+    assert (loaded["belt"].residual_m, loaded["belt"].residual_rad) == (0.003, 0.01)
+    np.testing.assert_array_equal(loaded["openvr"].T_world_space.p, np.zeros(3))
 
 
 def test_saving_leaves_no_other_file(calibration: Calibration, tmp_path: Path) -> None:
