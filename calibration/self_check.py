@@ -10,7 +10,7 @@ from lobstr_hw.calibration.slips import steps_of
 from lobstr_hw.calibration.t_pose import Check, TPose
 from lobstr_hw.trackers import FOUR_POINTS
 
-__all__ = ["SelfCheck", "self_check"]
+__all__ = ["SelfCheck", "check_calibration"]
 
 BEFORE_S, AFTER_S = 0.7, 0.9
 """Around the T-pose's window, looked at for trackers that slip; the pose is held that long."""
@@ -40,7 +40,7 @@ class SelfCheck:
         return "; ".join(str(check) for check in self.failed)
 
 
-def self_check(pose: TPose, recording: Movement, refinement: Refinement) -> SelfCheck:
+def check_calibration(pose: TPose, recording: Movement, refinement: Refinement) -> SelfCheck:
     """Look at a calibration from all sides.
 
     Args:

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from lobstr_hw.calibration import TPoseDetector, movement_from_samples, refine_by_movement
-from lobstr_hw.calibration.self_check import self_check
+from lobstr_hw.calibration.self_check import check_calibration
 from lobstr_hw.motion import Motion
 from lobstr_hw.simulation import (
     Habits,
@@ -106,7 +106,7 @@ def outcome(take: SimulatedTake, hints: dict[str, TrackerRole] | None = None) ->
         return Outcome(True, "T-pose", failed[0].name if failed else "not in sight")
     recording = movement_from_samples(samples, pose.serials)
     result = refine_by_movement(pose, recording.between(pose.end_s))
-    check = self_check(pose, recording, result)
+    check = check_calibration(pose, recording, result)
     first = check.failed[0].name if check.failed else ""
     return Outcome(not check.ok, "self-check", first.removeprefix("left_").removeprefix("right_"))
 
