@@ -1,1 +1,1 @@
-"""Lighthouse devices over USB, without SteamVR: what they say, and where they are (docs/lighthouse.md)."""
+"""Lighthouse devices over USB, without SteamVR: what they say and where they are."""

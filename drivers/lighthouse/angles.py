@@ -1,4 +1,4 @@
-"""What decoding hands to solving: angles, IMU samples, the device's model, the station's calibration.
+"""What decoding hands to solving: angles, IMU samples, device models, station calibrations.
 
 Times are ticks of a device's own 48 MHz clock, unwrapped to 64 bits (drivers/lighthouse/ticks.py).
 Frames: a device's IMU frame; a station's own frame (X right, Y up, it looks along -Z). Metres,

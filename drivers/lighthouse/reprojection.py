@@ -7,6 +7,7 @@ its constants are what a station sends about itself (drivers/lighthouse/ootx.py)
 import math
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from lobstr_hw.drivers.lighthouse.angles import StationCalibration
 from lobstr_hw.rotations import Array
@@ -14,9 +15,9 @@ from lobstr_hw.rotations import Array
 __all__ = ["reproject"]
 
 PLANE_TILT = np.array([math.pi / 6, -math.pi / 6])
-OGEE = np.array([0.0, 0.0, 0.0076069798, 5.3685255e-6, 0.0028679863, -8.0108022e-6])
-"""P(s), lowest power first: how far a curved plane of light moves at the elevation s."""
-OGEE_SLOPE = np.polynomial.polynomial.polyder(OGEE)
+OGEE = Polynomial([0.0, 0.0, 0.0076069798, 5.3685255e-6, 0.0028679863, -8.0108022e-6])
+"""P(s): how far a curved plane of light moves at the elevation s."""
+OGEE_SLOPE = OGEE.deriv()
 
 
 def reproject(calibration: StationCalibration, points: Array) -> Array:
@@ -55,10 +56,7 @@ def _gen2(c: StationCalibration, points: Array) -> Array:
     a = np.tan(tilt) * y / level  # (..., 2): sine of how far off its middle the tilted plane hits
     q = c.ogeemag * np.sin(bearing - _arcsin(a) + c.ogeephase) + c.curve
     s = _arcsin(y / (np.hypot(level, y) * np.cos(tilt)))
-    m, d = (
-        np.polynomial.polynomial.polyval(s, OGEE),
-        np.polynomial.polynomial.polyval(s, OGEE_SLOPE),
-    )
+    m, d = OGEE(s), OGEE_SLOPE(s)
     w = _arcsin(a + m * q / (np.cos(tilt) - d * q * np.sin(tilt)))
     turned = bearing - w
     angle: Array = turned + c.gibmag * np.sin(turned + c.gibphase) - c.phase - math.pi / 2
