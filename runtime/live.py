@@ -15,6 +15,7 @@ from lobstr_hw.runtime.clock import Clock, HostClock
 from lobstr_hw.runtime.controls import Controls, Say
 from lobstr_hw.runtime.feed import Feed
 from lobstr_hw.runtime.loop import run
+from lobstr_hw.runtime.one_space import in_one_space
 from lobstr_hw.runtime.outputs.output import Output
 from lobstr_hw.runtime.outputs.queued import QueuedOutput
 from lobstr_hw.runtime.outputs.sinks import SessionFacts, SinkSpec, make_output
@@ -68,6 +69,7 @@ class LiveSession:
     ``with LiveSession(...) as live: live.run(stop)``; leaving it closes driver and outputs.
 
     Attributes:
+        source: the driver, with all samples in one space.
         session: the user's calibration and avatar.
         feed: the trackers by role.
         outputs: open ones; a caller may add its own, which it closes itself.
@@ -121,6 +123,8 @@ class LiveSession:
         predictor = load_predictor(options.predictor)
         self._open.enter_context(self.driver)
         profile = chosen_profile(options.profile, self.driver, self.tell)
+        spaces = {} if profile is None else profile.tracking_spaces
+        self.source = in_one_space(self.driver, spaces, self.tell)
         table = RoleTable(None if profile is None else profile.roles, self.driver.devices)
         self.feed = Feed(predictor.card.accepts, table)
         self.watcher = TPoseWatcher(table)
@@ -196,7 +200,7 @@ class LiveSession:
         self.ticks.stop = stop
         with StatusLine(self.snapshot, self.options.quiet), _undisturbed():
             run(
-                self.driver,
+                self.source,
                 self.feed,
                 self.session,
                 self.outputs,

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from lobstr_hw.drivers.driver import DeviceEvent, EventKind, TrackerDriver
 from lobstr_hw.drivers.tracker_log import TrackerLogWriter
 from lobstr_hw.runtime.clock import Clock
+from lobstr_hw.runtime.many_drivers import ManyDrivers
+from lobstr_hw.runtime.one_space import SPACES
 from lobstr_hw.runtime.roles import RoleTable
 from lobstr_hw.trackers import TrackerRole, TrackerSample
 
@@ -113,6 +115,8 @@ class Recorder:
                 self.trackers[sample.serial], new[sample.serial] = TrackerTally(), sample
         if new or now_s - self._asked_s >= DEVICES_S:
             self._ask_devices(now_s)
+        if new and isinstance(self._driver, ManyDrivers):
+            self._writer.metadata(SPACES, self._spaces(self._driver))
         self._note(self._driver.events())
         for serial, first in new.items():  # a tracker's state stands before its first pose
             self._write_state(serial, first.time_s, first)
@@ -129,6 +133,10 @@ class Recorder:
             tally.battery = batteries.get(serial, tally.battery)
             if before != (tally.role, tally.battery):
                 self._write_state(serial, now_s)
+
+    def _spaces(self, driver: ManyDrivers) -> dict[str, str]:
+        """Samples are kept as the drivers gave them, so a replay has to know whose each is."""
+        return {serial: driver.space_of(serial) or "" for serial in self.trackers}
 
     def _note(self, events: Iterable[DeviceEvent]) -> None:
         for event in events:
