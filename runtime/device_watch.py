@@ -1,5 +1,6 @@
 """Looking at what is plugged in: one thread for each driver, so that none holds up the others."""
 
+import inspect
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -12,9 +13,10 @@ from lobstr_hw.trackers import TrackerRole, TrackingState
 
 __all__ = ["UNASKED", "DeviceReport", "DeviceWatch", "DriverReport", "merged"]
 
-UNASKED = frozenset({"fake", "lighthouse", "openvr", "openxr", "vmc"})
+UNASKED = frozenset({"fake", "lighthouse", "openvr", "vmc"})
 """Drivers that may be opened just to look: they take nothing away from another program. All others
-are opened when the user names them: a serial port may have something else at its other end."""
+are opened when the user names them: a serial port may have something else at its other end, and a
+session of OpenXR starts its runtime."""
 
 LISTEN_S = 0.5
 """Devices that send on their own are heard of within this time; the slowest send at 30 Hz."""
@@ -155,9 +157,20 @@ def _of_probe(name: str, found: type[TrackerDriver], probe: Probe) -> DriverRepo
     """Of a driver that is not opened."""
     if not probe.available:
         return DriverReport(name, False, probe.missing, probe.fix)
-    keys = list(getattr(found, "options", {}))[:2]
-    spec = f"{name}:{','.join(f'{key}=...' for key in keys)}" if keys else name
+    options = ",".join(f"{key}=..." for key in _needed(found))
+    spec = f"{name}:{options}" if options else name
     return DriverReport(name, True, "", f"lobstr-devices --driver {spec}")
+
+
+def _needed(found: type[TrackerDriver]) -> list[str]:
+    """The options to name: those without a default, and the port, which is seldom the right one."""
+    known = inspect.signature(found).parameters.values()
+    return [
+        option.name
+        for option in known
+        if option.name == "port"
+        or (option.default is option.empty and option.kind is option.POSITIONAL_OR_KEYWORD)
+    ]
 
 
 def merged(watches: Sequence[DeviceWatch]) -> list[DriverReport]:

@@ -18,6 +18,7 @@ __all__ = [
     "drivers_from_specs",
     "joined",
     "nothing_to_run",
+    "space_name",
     "what_is_there",
 ]
 
@@ -37,11 +38,11 @@ def driver_from_spec(spec: str) -> TrackerDriver:
     Raises:
         ValueError: no such driver or role, or an option it does not know.
     """
-    name, options = split_driver_spec(spec)
+    _, options = split_driver_spec(spec)
     driver = load_driver(spec)
     if not {"role", "name"} & options.keys():
         return driver
-    return PartDriver(driver, options.get("name", name), _role(options.get("role"), spec))
+    return PartDriver(driver, space_name(spec), _role(options.get("role"), spec))
 
 
 def _role(text: str | None, spec: str) -> TrackerRole | None:
@@ -54,6 +55,12 @@ def _role(text: str | None, spec: str) -> TrackerRole | None:
         raise ValueError(f"role={text} in {spec!r} is not one of {roles}") from error
 
 
+def space_name(spec: str) -> str:
+    """What a profile calls the tracking space of a driver: its name, or the one it was given."""
+    name, options = split_driver_spec(spec)
+    return options.get("name", name)
+
+
 def joined(specs: Sequence[str]) -> TrackerDriver:
     """One driver for all that the user named.
 
@@ -64,7 +71,7 @@ def joined(specs: Sequence[str]) -> TrackerDriver:
     if len(drivers) == 1 and not isinstance(drivers[0], PartDriver):
         return drivers[0]
     parts = [
-        driver if isinstance(driver, PartDriver) else PartDriver(driver, spec.partition(":")[0])
+        driver if isinstance(driver, PartDriver) else PartDriver(driver, space_name(spec))
         for driver, spec in zip(drivers, specs, strict=True)
     ]
     names = [part.name for part in parts]
@@ -127,17 +134,18 @@ def nothing_to_run(looked: dict[str, Probe] | None = None) -> TrackerNotFound:
     Args:
         looked: the probes of drivers that were tried already.
     """
-    looked = looked or {}
-    rows = [_row(name, looked.get(name) or _probe(name)) for name in sorted(DRIVERS)]
+    probes = {name: (looked or {}).get(name) or _probe(name) for name in sorted(DRIVERS)}
+    found = [_row(name, probes[name]) for name in TAKEN_UNASKED if name in probes]
+    named = [_row(name, probe) for name, probe in probes.items() if name not in TAKEN_UNASKED]
     return TrackerNotFound(
-        "no trackers to listen to. Looked for:\n"
-        + "\n".join(rows)
+        "no trackers found.\n"
+        + "\n".join([*found, "Listened to only when named, as in --driver vmc:", *named])
         + "\nWhat is plugged in: lobstr-devices\nTry it without any device: lobstr-live --sim"
     )
 
 
 def _row(name: str, probe: Probe) -> str:
-    if not probe.available:
-        return f"  {name}: {probe.missing}" + (f" ({probe.fix})" if probe.fix else "")
-    unasked = name in TAKEN_UNASKED
-    return f"  {name}: ready" + ("" if unasked else f"; name it: --driver {name}")
+    if probe.available:
+        return f"  {name}: ready"
+    missing = f"missing: {probe.missing}; {probe.fix}" if probe.fix else probe.missing
+    return f"  {name}: {missing}"

@@ -221,10 +221,12 @@ def _wizard(
 def _save(args: argparse.Namespace, path: Path, person: "Person") -> None:
     from lobstr_hw.calibration import save_profile
     from lobstr_hw.calibration.calibration import TrackingSpace
+    from lobstr_hw.runtime.sources import space_name
     from lobstr_hw.runtime.wizard.result import document, show
 
     assert person.calibration is not None
-    names = ["replay"] if args.sim else [spec.partition(":")[0] for spec in args.driver]
+    # the world is the space of the first; nothing is known of others
+    names = ["replay"] if args.sim else [space_name(spec) for spec in args.driver[:1]]
     spaces = {name: TrackingSpace() for name in names}
     person.calibration = replace(person.calibration, tracking_spaces=spaces)
     save_profile(path, person.calibration)

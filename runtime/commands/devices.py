@@ -3,7 +3,6 @@
 import argparse
 import json
 import sys
-import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict
@@ -12,7 +11,7 @@ from rich.console import Console
 from rich.live import Live
 
 from lobstr_hw.drivers import DRIVERS, split_driver_spec
-from lobstr_hw.runtime.clock import HostClock
+from lobstr_hw.runtime.clock import Clock, HostClock
 from lobstr_hw.runtime.commands.devices_table import page
 from lobstr_hw.runtime.device_watch import ANSWER_S, DeviceWatch, DriverReport, merged
 from lobstr_hw.runtime.sources import driver_from_spec
@@ -40,9 +39,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         for watch in watches:
             watch.start()
         try:
-            _wait(watches, stop)
+            _wait(watches, stop, clock)
             if args.watch:
-                _draw(watches, stop, Console(stderr=args.json))
+                _draw(watches, stop, clock, Console(stderr=args.json))
         finally:
             _close(watches)
     reports = merged(watches)
@@ -96,18 +95,21 @@ def _specs(asked: Sequence[str]) -> list[tuple[str, bool]]:
     return sorted(specs, key=lambda spec: spec[0])
 
 
-def _wait(watches: Sequence[DeviceWatch], stop: Callable[[], bool]) -> None:
+def _wait(watches: Sequence[DeviceWatch], stop: Callable[[], bool], clock: Clock) -> None:
     """Until all have answered, or long enough."""
-    left_s = ANSWER_S
-    while left_s > 0.0 and not stop() and not all(watch.settled.is_set() for watch in watches):
-        time.sleep(STEP_S)
-        left_s -= STEP_S
+    end_s = clock.now_s() + ANSWER_S
+    while not (stop() or all(watch.settled.is_set() for watch in watches)):
+        if clock.now_s() > end_s:
+            break
+        clock.sleep(STEP_S)
     for watch in watches:
         if not watch.settled.is_set() and not stop():
             _tell(f"the driver {watch.name} did not answer within {ANSWER_S:g} s; going on.")
 
 
-def _draw(watches: Sequence[DeviceWatch], stop: Callable[[], bool], console: Console) -> None:
+def _draw(
+    watches: Sequence[DeviceWatch], stop: Callable[[], bool], clock: Clock, console: Console
+) -> None:
     """One page that is drawn anew; into a pipe or file, a page at every change."""
     with (
         Live(console=console, auto_refresh=False) if console.is_terminal else nullcontext() as live
@@ -120,7 +122,7 @@ def _draw(watches: Sequence[DeviceWatch], stop: Callable[[], bool], console: Con
             elif now != before:
                 console.print(page(now))
             before = now
-            time.sleep(REFRESH_S)
+            clock.sleep(REFRESH_S)
 
 
 def _close(watches: Sequence[DeviceWatch]) -> None:

@@ -54,9 +54,10 @@ def test_where_nothing_is_there_it_is_told_how_to_get_each(machine: Machine) -> 
     with pytest.raises(TrackerNotFound) as raised:
         drivers_from_specs([], print)
     lines = str(raised.value).splitlines()
-    assert "  fake: ready; name it: --driver fake" in lines
-    assert "  openvr: the dongle is in use. Close the other program." in lines
-    assert "  polhemus: the Python package snake (pip install snake)" in lines
+    assert lines[1] == "  openvr: the dongle is in use. Close the other program."
+    assert "as in --driver" in lines[2]
+    assert "  fake: ready" in lines
+    assert "  polhemus: missing: the Python package snake; pip install snake" in lines
     assert "  vmc: its driver failed (RuntimeError: ouch)" in lines
     assert lines[-1].endswith("lobstr-live --sim")
 
