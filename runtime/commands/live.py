@@ -29,6 +29,7 @@ EXAMPLES = """examples:
   lobstr-live --sim                         the bundled recording, in real time
   lobstr-live --sim take.mcap --fast --output bvh:out.bvh --summary s.json
   lobstr-live --driver fake --output ndjson:- --duration 10
+  lobstr-live --driver openvr --driver polhemus:port=/dev/ttyUSB0,role=pelvis
 """
 
 
