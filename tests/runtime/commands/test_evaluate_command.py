@@ -121,7 +121,7 @@ def test_a_missing_path_and_an_unknown_predictor_fail_with_one_message(
     assert "no such file" in capsys.readouterr().err
     assert main([str(data), "--predictor", "lobster"]) == 1
     printed = capsys.readouterr()
-    assert "lobstr, mean_pose, standing" in printed.err
+    assert "lobstr, lobstr-paper, mean_pose, standing" in printed.err
     assert printed.out == ""
 
 
