@@ -6,10 +6,11 @@ import numpy as np
 from rich.table import Table
 
 from lobstr_hw.calibration import Calibration, TPose
+from lobstr_hw.calibration.movement import Refinement
 from lobstr_hw.calibration.verdict import Grade, findings, verdict
 from lobstr_hw.rotations import Array
 
-__all__ = ["closing_words", "tables"]
+__all__ = ["closing_words", "movement_table", "tables"]
 
 _STYLES = {Grade.GOOD: "green", Grade.FAIR: "yellow", Grade.POOR: "red"}
 _WORDS = {
@@ -66,6 +67,15 @@ def _direction(off_cm: Array) -> str:
         if abs(value) >= 0.5
     ]
     return ", ".join(parts) + " cm" if parts else "nothing"
+
+
+def movement_table(refinement: Refinement) -> Table:
+    """How well each is known before and after the movement."""
+    table = Table("what", "T-pose", "and movement", "to know it better", title="Give or take")
+    for q in refinement.quantities:
+        better = "" if q.refined else q.missing
+        table.add_row(q.name, f"{q.before:.1f} {q.unit}", f"{q.after:.1f} {q.unit}", better)
+    return table
 
 
 def _findings(calibration: Calibration) -> Table:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from lobstr_hw.drivers.driver import DeviceInfo
+from lobstr_hw.drivers.driver import BASE_STATION, DeviceInfo
 from lobstr_hw.runtime.wizard.view import DeviceRow
 from lobstr_hw.trackers import FOUR_POINTS, TrackerRole, TrackerSample
 
@@ -10,6 +10,8 @@ __all__ = ["DeviceTable"]
 
 SIGHT_S = 0.5
 """A device is in sight that was tracked this lately."""
+
+
 _CYCLE: tuple[TrackerRole | None, ...] = (*FOUR_POINTS, None)
 
 
@@ -30,6 +32,8 @@ class DeviceTable:
     def update(self, devices: Iterable[DeviceInfo]) -> None:
         """Take in what devices say of themselves; the first that claims a role has it."""
         for device in devices:
+            if device.kind == BASE_STATION:
+                continue
             self._info[device.serial] = device
             role, serial = device.role_hint, device.serial
             if role is None or serial in self._touched or role in self.roles.values():

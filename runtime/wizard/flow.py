@@ -26,6 +26,8 @@ DIGITS = tuple("123456789")
 KEYS = "enter: go on   q: stop"
 DEVICE_KEYS = "enter: go on   1-9: change what a device is   q: stop"
 
+MOST_TRIES = 3
+
 MakeStage = Callable[[Person], Stage]
 
 
@@ -35,6 +37,7 @@ class Wizard:
     Attributes:
         person: what is known so far.
         done: all stages are through; ``person`` has the calibration.
+        refused: every try was wrong; ``failure`` says why.
         stopped: somebody asked for the end.
     """
 
@@ -50,8 +53,11 @@ class Wizard:
         """
         self.person = person
         self.done = False
+        self.refused = False
         self.stopped = False
         self._plan = list(stages)
+        self._refusals: list[str] = []
+        self._restart_at = 0
         self._length_s = countdown_s
         self._now_s = 0.0
         self._begin(0)
@@ -59,6 +65,8 @@ class Wizard:
     def _begin(self, index: int) -> None:
         self._index = index
         self.stage = self._plan[index](self.person)
+        if self.stage.restarts:
+            self._restart_at = index
         self._said = ""
         self._said_s = -float("inf")
         self._advice, self._advice_s, self._advised_s = "", 0.0, -float("inf")
@@ -111,7 +119,7 @@ class Wizard:
         return None
 
     def _turn(self, samples: Sequence[TrackerSample], pressed: str | None) -> list[Spoken]:
-        if self.done:
+        if self.done or self.refused:
             return []
         said = self._prompt()
         if self._counts(pressed):
@@ -120,10 +128,26 @@ class Wizard:
             return said + self._prompt() + self._advise()
         words = self.stage.done_words()
         said += [] if words is None else [words]
-        if self._index + 1 == len(self._plan):
+        return said + self._next()
+
+    def _next(self) -> list[Spoken]:
+        """The stage after this one; or once more from where it restarts."""
+        said = []
+        check = self.person.check
+        if check is not None and not check.ok:
+            self._refusals.append(check.reason)
+            if len(self._refusals) == MOST_TRIES:
+                self.refused = True
+                return []
+            advice = check.failed[0].advice
+            said = [Spoken(f"That was not right: {advice}. Once more.", Sound.TROUBLE)]
+            self.person.once_more()
+            self._begin(self._restart_at)
+        elif self._index + 1 == len(self._plan):
             self.done = True
-            return said
-        self._begin(self._index + 1)
+            return []
+        else:
+            self._begin(self._index + 1)
         return said + self._prompt()
 
     def _prompt(self) -> list[Spoken]:
@@ -170,12 +194,13 @@ class Wizard:
 
     def failure(self) -> CalibrationError:
         """Why it is not done, when nothing more comes."""
+        if self._refusals:
+            return CalibrationError(
+                f"the calibration is refused: {self._refusals[-1]}. Nothing was saved."
+            )
         return self.stage.failure()
 
     def end(self) -> None:
         """Nothing more comes: finish a stage that can do with what it has."""
-        while not self.done and self.stage.end():
-            if self._index + 1 == len(self._plan):
-                self.done = True
-            else:
-                self._begin(self._index + 1)
+        while not (self.done or self.refused) and self.stage.end():
+            self._next()

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from lobstr_hw.calibration.movement import refine_by_movement
 from lobstr_hw.calibration.recording import movement_from_samples
+from lobstr_hw.calibration.self_check import check_calibration
 from lobstr_hw.runtime.wizard.stage import Person, Stage
 from lobstr_hw.trackers import TrackerSample
 
@@ -130,13 +131,16 @@ class WatchMovement(Stage):
 
 
 def refine(person: Person) -> None:
-    """Calibrate from the T-pose and all movement since."""
+    """Calibrate from the T-pose and all movement since, and look whether it can be right."""
     assert person.t_pose is not None
+    pose = person.t_pose
+    recording = movement_from_samples(person.movement, pose.serials)
     person.refinement = refine_by_movement(
-        person.t_pose,
-        movement_from_samples(person.movement, person.t_pose.serials),
+        pose,
+        recording.between(pose.end_s),
         stature_m=person.stature_m,
         floor_m=person.floor_m,
         created=person.created,
     )
     person.calibration = person.refinement.calibration
+    person.check = check_calibration(pose, recording, person.refinement)

@@ -6,9 +6,10 @@ from typing import Any
 
 from rich.console import Console
 
+from lobstr_hw.calibration.movement import Refinement
 from lobstr_hw.calibration.verdict import Grade, findings, verdict
 from lobstr_hw.runtime.announcer import Sound, Spoken
-from lobstr_hw.runtime.commands.calibrate_tables import closing_words, tables
+from lobstr_hw.runtime.commands.calibrate_tables import closing_words, movement_table, tables
 from lobstr_hw.runtime.wizard.stage import Person
 
 __all__ = ["document", "show", "spoken_result"]
@@ -36,7 +37,17 @@ def document(person: Person, path: Path) -> dict[str, Any]:
         "floor_height_m": calibration.floor_m,
         "trackers": {serial: str(role) for serial, role in calibration.roles.items()},
         "residuals": asdict(calibration.residuals),
+        "movement": None if person.refinement is None else _movement(person.refinement),
     }
+
+
+def _movement(refinement: Refinement) -> dict[str, Any]:
+    """What is known how well before and after the movement (deviations)."""
+    quantities = {
+        q.name: {"unit": q.unit, "before": q.before, "after": q.after, "missing": q.missing}
+        for q in refinement.quantities
+    }
+    return {"quantities": quantities, "missing": list(refinement.missing)}
 
 
 def show(person: Person, path: Path) -> None:
@@ -46,6 +57,8 @@ def show(person: Person, path: Path) -> None:
     console = Console()
     for table in tables(pose, calibration):
         console.print(table)
+    if person.refinement is not None:
+        console.print(movement_table(person.refinement))
     for line in closing_words(calibration, path):
         console.print(line, soft_wrap=True, highlight=False, markup=False)
 

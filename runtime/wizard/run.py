@@ -43,10 +43,10 @@ def run_on_log(driver: ReplayDriver, wizard: Wizard, stop: Callable[[], bool]) -
     while not (wizard.done or stop()):
         now_s = turn * LOG_STEP_S
         wizard.add(now_s, driver.poll(now_s), driver.events(), driver.devices())
-        if driver.finished(now_s) and not wizard.done:
+        if driver.finished(now_s):
             wizard.end()
-            if not wizard.done:
-                raise wizard.failure()
+        if wizard.refused or (driver.finished(now_s) and not wizard.done):
+            raise wizard.failure()
         turn += 1
 
 
@@ -61,7 +61,7 @@ def run_with_person(
     """Go on until the wizard is done, the person stops it, or the time is over.
 
     Raises:
-        CalibrationError: the time is over; says what was missing.
+        CalibrationError: the time is over, or no try was right; says what was missing.
     """
     began_s = clock.now_s()
     while not (wizard.done or wizard.stopped or stop()):
@@ -73,4 +73,6 @@ def run_with_person(
             said += wizard.press(key)
         front.say(said)
         front.show(wizard.view())
+        if wizard.refused:
+            raise wizard.failure()
         clock.sleep(now_s + TURN_S - clock.now_s())

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from lobstr_hw.calibration import Calibration, TPose
 from lobstr_hw.calibration.movement import Refinement
+from lobstr_hw.calibration.self_check import SelfCheck
 from lobstr_hw.errors import CalibrationError
 from lobstr_hw.runtime.announcer import Spoken
 from lobstr_hw.runtime.wizard.device_table import DeviceTable
@@ -25,9 +26,9 @@ class Person:
         floor_m: of the tracking space.
         t_pose: once it is found.
         calibration: once it is made.
-        movement: samples since the T-pose.
+        movement: samples of the T-pose and since.
         refinement: what the movement told; None before it was looked at.
-        reasons: why a self-check refuses it; empty when it does not.
+        check: what the self-check found; None before it was made.
     """
 
     table: DeviceTable = field(default_factory=DeviceTable)
@@ -38,7 +39,12 @@ class Person:
     calibration: Calibration | None = None
     movement: list[TrackerSample] = field(default_factory=list)
     refinement: Refinement | None = None
-    reasons: tuple[str, ...] = ()
+    check: SelfCheck | None = None
+
+    def once_more(self) -> None:
+        """Forget the T-pose and what came of it."""
+        self.t_pose = self.calibration = self.refinement = self.check = None
+        self.movement = []
 
 
 class Stage:
@@ -49,6 +55,7 @@ class Stage:
         instruction: what the person should do, for the eye.
         spoken: the same for the ear, short; also said again when nothing happens.
         counted: whether a countdown may stand before it.
+        restarts: where to go on when a calibration turns out wrong; the last such stage counts.
         repeats_s: how often ``spoken`` is said again.
     """
 
@@ -56,6 +63,7 @@ class Stage:
     instruction = ""
     spoken = ""
     counted = True
+    restarts = False
     repeats_s = 15.0
 
     def __init__(self, person: Person) -> None:

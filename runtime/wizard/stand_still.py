@@ -21,6 +21,7 @@ class StandStill(Stage):
 
     title = "Stand still"
     instruction = "Stand upright and still, feet under your hips; look straight ahead."
+    restarts = True
     spoken = "Stand still and look straight ahead."
 
     def __init__(self, person: Person) -> None:

@@ -1,8 +1,10 @@
 """The T-pose itself, with its quality shown live."""
 
+from collections import deque
 from collections.abc import Sequence
 
 from lobstr_hw.calibration import TPose, TPoseDetector, TPoseQuality, calibrate_t_pose
+from lobstr_hw.calibration.self_check import AFTER_S
 from lobstr_hw.errors import CalibrationError
 from lobstr_hw.runtime.announcer import Sound, Spoken
 from lobstr_hw.runtime.wizard.bars import quality_bars, worst_advice
@@ -13,9 +15,11 @@ from lobstr_hw.trackers import TrackerSample
 __all__ = ["TakeTPose"]
 
 HOLD_S = 1.5
-SETTLE_S = 0.7
+SETTLE_S = 0.4
 """The first window that is good enough has the last centimetres of raising the arms in it; for so
 long a stiller one is looked for."""
+KEPT_S = 6.0
+"""Samples from before the end of the T-pose: the self-check looks at both sides of it."""
 GLANCE_S = 0.4
 """The bars look at so little time, to follow a movement at once."""
 
@@ -37,6 +41,7 @@ class TakeTPose(Stage):
         hints, floor_m = self.person.table.roles, self.person.floor_m
         self._held = TPoseDetector(hints, hold_s=HOLD_S, floor_m=floor_m)
         self._glance = TPoseDetector(hints, hold_s=GLANCE_S, floor_m=floor_m)
+        self._kept: deque[TrackerSample] = deque()
         self._best: TPose | None = None
         self._best_since_s = 0.0
         self._good_s: float | None = None
@@ -49,10 +54,14 @@ class TakeTPose(Stage):
         self._now_s = now_s
         for detector in (self._held, self._glance):
             detector.hints.update(self.person.table.roles)
+        self._kept.extend(samples)
+        while self._kept and self._kept[0].time_s < now_s - KEPT_S:
+            self._kept.popleft()
         for sample in samples:
             self._glance.add((sample,))
-            self._choose(self._held.add((sample,)))
-            if self._best is not None and sample.time_s - self._best_since_s >= SETTLE_S:
+            if self._best is None or sample.time_s - self._best_since_s < SETTLE_S:
+                self._choose(self._held.add((sample,)))
+            elif sample.time_s >= self._best.end_s + AFTER_S:
                 self._calibrate(self._best)
                 return True
         if self._quality is None or not self._quality.ok:
@@ -78,6 +87,7 @@ class TakeTPose(Stage):
     def _calibrate(self, pose: TPose) -> None:
         person = self.person
         person.t_pose = pose
+        person.movement = list(self._kept)
         person.calibration = calibrate_t_pose(
             pose, stature_m=person.stature_m, floor_m=person.floor_m, created=person.created
         )
@@ -98,7 +108,7 @@ class TakeTPose(Stage):
         """Of the holding."""
         if self._good_s is None:
             return 0.0
-        return min(1.0, (self._now_s - self._good_s) / (HOLD_S + SETTLE_S))
+        return min(1.0, (self._now_s - self._good_s) / (HOLD_S + SETTLE_S + AFTER_S))
 
     def done_words(self) -> Spoken | None:
         """The pose is taken."""
