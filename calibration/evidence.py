@@ -27,8 +27,8 @@ UPRIGHT_HEAD = np.deg2rad([2.3, 0.0, 1.8])
 WALKING_PELVIS = np.deg2rad(2.6)
 """Yaw against the way: clips of one recorded actor spread by 2.6."""
 WALKING_HEAD = np.deg2rad(2.5)
-NOD = np.deg2rad([0.0, 3.2, 3.2])
-SHAKE = np.deg2rad([5.0, 0.0, 3.5])
+NOD = np.deg2rad([0.0, 3.8, 3.8])
+SHAKE = np.deg2rad([6.0, 0.0, 4.5])
 TWIST = np.deg2rad([0.0, 4.5, 4.5])
 BEND = np.deg2rad([6.0, 6.0, 0.0])
 HAND_TRUST = 1.6

@@ -17,10 +17,10 @@ __all__ = ["head_place", "levers_from_movement"]
 HEAD, LEFT, RIGHT, PELVIS = range(4)
 _WINDOW = round(0.4 * RATE_HZ)
 _TURN_WINDOW = round(1.2 * RATE_HZ)
-_HAND_REST_M = 0.006
-_HEAD_REST_M = 0.006
+_HAND_REST_M = 0.009
+_HEAD_REST_M = 0.003
 _TURN_REST_M = 0.02
-_BOW_REST_M = 0.012
+_BOW_REST_M = 0.015
 _NECK = -0.33 * float(STANDARD_OFFSETS[Joint.HEAD, 1])
 """A nod is two thirds at the skull's base and a third at the neck's lower end: its pivot lies so
 far below the skull's base (of a person of the mean stature)."""

@@ -74,7 +74,7 @@ class Habits:
             walking=np.deg2rad([1.0, 0.0]) + _degrees(rng, 1.0, 1.5),
             pivot_m=rng.normal(0.0, 1.0, 2) * (0.008, 0.015),
             knees=float(rng.uniform(0.0, 0.35)),
-            tempo=float(rng.uniform(0.95, 1.25)),
+            tempo=float(rng.uniform(1.1, 1.4)),
         )
 
 
@@ -99,6 +99,7 @@ class Performance:
         turn_rad: on the spot; negative to the right.
         pivot_m: (2,) off the habit.
         bow_first: before the steps, or after the turn.
+        arms_out: nods and twists with the arms still out; else lowers them before.
         tempo: on top of the habit's.
     """
 
@@ -125,6 +126,7 @@ class Performance:
     turn_rad: float
     pivot_m: Array
     bow_first: bool
+    arms_out: bool
     tempo: float
 
     @staticmethod
@@ -156,6 +158,7 @@ class Performance:
             turn_rad=float(np.deg2rad(rng.uniform(220.0, 400.0)) * rng.choice([-1.0, 1.0])),
             pivot_m=rng.normal(0.0, 1.0, 2) * (0.008, 0.012),
             bow_first=bool(rng.random() < 0.7),
+            arms_out=bool(rng.random() < 0.5),
             tempo=float(rng.uniform(0.9, 1.15)),
         )
 
@@ -173,11 +176,13 @@ class _Plan:
 
     @staticmethod
     def of(habits: Habits, now: Performance) -> "_Plan":
-        """Gestures with both arms out, then the rest one after the other."""
+        """Head and hands first, then the rest one after the other."""
         pace = 1.0 / (habits.tempo * now.tempo)
-        at = 2.8 * pace
-        spans = {"gestures": (0.2 * pace, at), "lower": (at - 0.1 * pace, at + 0.9 * pace)}
-        at += 0.35 * pace
+        start = 0.2 * pace if now.arms_out else 0.9 * pace
+        at = start + 2.6 * pace
+        lower = at - 0.1 * pace if now.arms_out else 0.0
+        spans = {"gestures": (start, at), "lower": (lower, lower + 1.0 * pace)}
+        at += 0.35 * pace if now.arms_out else 0.0
         walk_s = 0.6 * (now.steps + 1) * pace  # the last one only closes
         turn_s = (0.6 + abs(now.turn_rad) / np.deg2rad(360.0) * 1.9) * pace
         lengths = {"bow": 1.8 * pace, "walk": walk_s, "turn": turn_s}
