@@ -19,7 +19,9 @@ SETTLE_S = 0.4
 """The first window that is good enough has the last centimetres of raising the arms in it; for so
 long a stiller one is looked for."""
 KEPT_S = 6.0
-"""Samples from before the end of the T-pose: the self-check looks at both sides of it."""
+ARRIVED_S = 0.2
+"""The first window may have so much of raising the arms in it, which the self-check would take for
+trackers that slip."""
 GLANCE_S = 0.4
 """The bars look at so little time, to follow a movement at once."""
 
@@ -87,7 +89,8 @@ class TakeTPose(Stage):
     def _calibrate(self, pose: TPose) -> None:
         person = self.person
         person.t_pose = pose
-        person.movement = list(self._kept)
+        held_s = self._best_since_s - HOLD_S + ARRIVED_S
+        person.movement = [sample for sample in self._kept if sample.time_s >= held_s]
         person.calibration = calibrate_t_pose(
             pose, stature_m=person.stature_m, floor_m=person.floor_m, created=person.created
         )
