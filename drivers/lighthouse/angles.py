@@ -86,6 +86,7 @@ class DeviceModel:
         acc_scale: (3,) factor.
         gyro_bias_rad_s: (3,) subtracted before the factor.
         gyro_scale: (3,) factor.
+        product_id: the USB product id that it has by cable.
     """
 
     serial: str
@@ -100,6 +101,7 @@ class DeviceModel:
     acc_scale: Array
     gyro_bias_rad_s: Array
     gyro_scale: Array
+    product_id: int = 0
 
 
 def _zeros() -> Array:

@@ -5,11 +5,11 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
+from typing import IO, cast
 
 from lobstr_hw.errors import FileFormatError
 
-__all__ = ["CutShort", "LONGEST", "open_capture", "take"]
+__all__ = ["LONGEST", "CutShort", "open_capture", "take"]
 
 LONGEST = 1 << 20
 """Bytes of the longest record that is believed: USB packets here have 64, strings a few hundred."""
@@ -35,7 +35,7 @@ def open_capture(path: Path) -> Iterator[IO[bytes]]:
                 yield packed
                 return
             with gzip.open(packed) as unpacked:
-                yield unpacked
+                yield cast(IO[bytes], unpacked)
     except OSError as error:
         raise FileFormatError(f"{path}: cannot be read: {error}") from error
 

@@ -22,7 +22,7 @@ __all__ = [
 Pulse = tuple[int, int, int]
 """Port of the sensor, start (32 bits of ticks), length in ticks."""
 ImuSlot = tuple[int, int, tuple[int, ...]]
-"""Sequence number (8 bits), ticks (32 bits), six counts: acceleration x, y, z, gyroscope x, y, z."""
+"""Sequence (8 bits), ticks (32 bits), six counts: acceleration x, y, z, gyroscope x, y, z."""
 
 
 @dataclass(frozen=True, slots=True)

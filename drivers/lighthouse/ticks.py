@@ -2,11 +2,16 @@
 
 __all__ = ["Ticks"]
 
+LATE = 1 << 24
+"""An IMU sample may come this much after a newer one (0.35 s); further back the clock was set."""
+
 
 class Ticks:
     """Extends a device's 32 and 24 bit times to 64 bits, by the IMU samples it sends all the time.
 
-    The first time of all keeps its own value, so that ``ticks % 2**32`` is what the device said.
+    The first time of all keeps its own value, so that ``ticks % 2**32`` is what the device said. A
+    device that restarts its clock (some do when their light mode is switched) makes a gap, not a
+    step back.
     """
 
     def __init__(self) -> None:
@@ -14,8 +19,11 @@ class Ticks:
         self.newest: int | None = None
 
     def imu(self, low: int) -> int:
-        """The full time of an IMU sample, from its 32 bits: within 2**31 of the sample before."""
-        self.newest = full = low if self.newest is None else _near(self.newest, low, 32)
+        """The full time of an IMU sample, from its 32 bits."""
+        if self.newest is None:
+            self.newest = low
+        full = self.newest - LATE + ((low - self.newest + LATE) & 0xFFFFFFFF)
+        self.newest = max(self.newest, full)
         return full
 
     def light(self, low: int, bits: int) -> int | None:
@@ -26,14 +34,9 @@ class Ticks:
             bits: how many, 24 or 32.
 
         Returns:
-            None before the first IMU sample, if 24 bits are all there is.
+            None before the first IMU sample: nobody knows the bits that are missing.
         """
         if self.newest is None:
-            return self.imu(low) if bits == 32 else None
-        return _near(self.newest, low, bits)
-
-
-def _near(time: int, low: int, bits: int) -> int:
-    """The time nearest to another whose lowest bits are ``low``."""
-    half = 1 << (bits - 1)
-    return time + ((low - time + half) & ((1 << bits) - 1)) - half
+            return None
+        half = 1 << (bits - 1)
+        return self.newest + ((low - self.newest + half) & ((1 << bits) - 1)) - half

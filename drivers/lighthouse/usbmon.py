@@ -63,9 +63,7 @@ def _records(stream: IO[bytes]) -> Iterator[bytes]:
     try:
         while True:
             _, _, count, _ = RECORD.unpack(take(stream, RECORD.size))
-            if (
-                count > LONGEST
-            ):  # one bad bit in a compressed stream makes noise of all that follows
+            if count > LONGEST:  # a bad bit in a compressed stream makes noise of the rest
                 return
             yield take(stream, count)
     except CutShort:

@@ -1,0 +1,148 @@
+"""Reports of one device -> its raw events: samples sorted, repeats dropped, times unwrapped."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lobstr_hw.drivers.lighthouse.angles import Ints
+from lobstr_hw.drivers.lighthouse.compact_light import parse_compact_light
+from lobstr_hw.drivers.lighthouse.gen2_words import SyncWord, parse_words
+from lobstr_hw.drivers.lighthouse.radio import Inputs, RadioMessage, parse_message
+from lobstr_hw.drivers.lighthouse.raw_events import RawEvents
+from lobstr_hw.drivers.lighthouse.reports import (
+    BeamReport,
+    GoneReport,
+    ImuReport,
+    ImuSlot,
+    PulseReport,
+    RadioReport,
+    SweepReport,
+    parse_report,
+)
+from lobstr_hw.drivers.lighthouse.ticks import Ticks
+
+__all__ = ["OLD_RADIO", "DeviceReader"]
+
+OLD_RADIO = frozenset({0x2012, 0x2022})
+"""Product ids of wand and Tracker 1.0, which keep to the old radio protocol and to Gen1."""
+SHORTEST_LIGHT = 4
+"""Bytes: a time and at least something before it."""
+
+
+class DeviceReader:
+    """Takes the reports of one device in their order; ``take`` hands out what they held.
+
+    Attributes:
+        battery: 0 to 1, or None: not told yet.
+        charging: as last told.
+        inputs: the latest buttons and the like, or None.
+        sees_gen2: it lies in the light of Gen2 stations but is set up for Gen1.
+        gone: the tracker behind the dongle was switched off and has said nothing since.
+        unreadable: radio messages and light data that made no sense.
+    """
+
+    def __init__(self, old_radio: bool, gen2_mode: bool = True) -> None:
+        """Nothing was heard.
+
+        Args:
+            old_radio: which radio protocol, by OLD_RADIO; nothing by cable.
+            gen2_mode: the light mode that the device was set to; the old radio protocol has none.
+        """
+        self._old_radio = old_radio
+        self.gen2_mode = gen2_mode and not old_radio
+        self._ticks = Ticks()
+        self._sequence: int | None = None
+        self.battery: float | None = None
+        self.charging = False
+        self.inputs: Inputs | None = None
+        self.sees_gen2 = self.gone = False
+        self.unreadable = 0
+        self._clear()
+
+    def _clear(self) -> None:
+        self._imu: list[tuple[int, ...]] = []
+        self._pulses: list[tuple[int, ...]] = []
+        self._syncs: list[tuple[int, ...]] = []
+        self._sweeps: list[tuple[int, ...]] = []
+        self._syncs_before: list[int] = []
+
+    def feed(self, data: bytes) -> None:
+        """One input report; what is no report of such a device is left alone."""
+        match parse_report(data):
+            case ImuReport(slots):
+                self._add_imu(slots)
+            case PulseReport(pulses):
+                self._add_pulses(pulses)
+            case SweepReport(words):
+                self._add_words(words)
+            case RadioReport(messages):
+                self.gone = False
+                for message in messages:
+                    self._add_message(parse_message(message, self._old_radio))
+            case BeamReport():
+                self.sees_gen2 = True
+            case GoneReport():
+                self.gone = True
+
+    def take(self) -> RawEvents:
+        """What was heard since the last call."""
+        events = RawEvents(
+            imu=_table(self._imu, 7),
+            pulses=_table(self._pulses, 3),
+            syncs=_table(self._syncs, 4),
+            sweeps=_table(self._sweeps, 4),
+            syncs_before=np.array(self._syncs_before, dtype=np.int64),
+        )
+        self._clear()
+        return events
+
+    def _add_imu(self, slots: tuple[ImuSlot, ...]) -> None:
+        """The samples that are newer than the last one: sequence numbers go round at 256."""
+        last = slots[0][0] - 128 if self._sequence is None else self._sequence
+        for age, slot in sorted(((slot[0] - last) & 0xFF, slot) for slot in slots):
+            if 0 < age < 128 or self._sequence is None:
+                self._sequence = slot[0]
+                self._imu.append((self._ticks.imu(slot[1]), *slot[2]))
+
+    def _add_pulses(self, pulses: tuple[tuple[int, int, int], ...]) -> None:
+        for port, low, length in pulses:
+            start = self._ticks.light(low, 32)
+            if start is not None:
+                self._pulses.append((port, start, length))
+
+    def _add_words(self, data: bytes) -> None:
+        for word in parse_words(data):
+            ticks = self._ticks.light(word.time, 24)
+            if ticks is None:
+                continue
+            if isinstance(word, SyncWord):
+                self._syncs.append((word.channel, ticks, word.data_bit, word.g_bit))
+            else:
+                self._sweeps.append((word.channel, word.port, ticks, word.half_tick))
+                self._syncs_before.append(len(self._syncs))
+
+    def _add_message(self, message: RadioMessage | None) -> None:
+        if message is None:
+            self.unreadable += 1
+            return
+        if message.imu is not None:
+            self._imu.append((self._ticks.imu(message.ticks), *message.imu))
+        if message.battery is not None:
+            self.battery, self.charging = message.battery, message.charging
+        self.inputs = message.inputs or self.inputs
+        if len(message.light) >= SHORTEST_LIGHT:
+            self._add_radio_light(message.light)
+
+    def _add_radio_light(self, light: bytes) -> None:
+        if self.gen2_mode:
+            self._add_words(light)
+            return
+        last_edge = self._ticks.light(int.from_bytes(light[-3:], "little"), 24)
+        if last_edge is not None:
+            pulses = parse_compact_light(light, last_edge)
+            self._pulses += pulses
+            self.unreadable += not pulses
+
+
+def _table(rows: Sequence[tuple[int, ...]], columns: int) -> Ints:
+    return np.array(rows, dtype=np.int64).reshape(-1, columns)
