@@ -1,4 +1,4 @@
-"""The section "The predictor" of docs/results.md, measured.
+"""The sections of docs/results.md on the shipped networks, measured.
 
 python tools/predictor_results.py DATA OUT [--weights FILE.onnx] [--write docs/results.md]
 
@@ -30,10 +30,14 @@ PARTS = {
     "test_same_actor": "Held-out clips of the training actors",
 }
 ROWS = {
-    "carried": "the network, carried (ships)",
+    "carried": "the network, carried",
     "windowed": "the same network, windowed",
     "mean_pose": "mean pose of the training data",
     "standing": "constant standing pose",
+}
+TITLES = {
+    "lobstr": "The network that ships (`lobstr`)",
+    "lobstr-paper": "The paper's recipe (`lobstr-paper`)",
 }
 PAPER = """The paper's Table 1, **measured on other data** (its own split of PFNN, MHAD and CMU, its
 own skeleton, contact by 1 cm):
@@ -111,7 +115,10 @@ def _section(options: argparse.Namespace) -> str:
         )
         parts.append(f"### {title} (`{part}`, {minutes})\n\n{_table(trees)}\n")
         parts.append(f"By set, carried:\n\n{_by_set(trees['carried'])}\n")
-    return "## The predictor\n\n" + "\n".join(parts) + "\n" + PAPER
+    title = TITLES.get(card.name, card.name)
+    return (
+        f"## {title}\n\n" + "\n".join(parts) + ("\n" + PAPER if card.name == "lobstr-paper" else "")
+    )
 
 
 def _read(out: Path, part: str, row: str) -> dict[str, Any]:
@@ -124,19 +131,32 @@ def _recipe(details: dict[str, Any]) -> str:
     minutes = data["minutes_by_set"]
     sets = ", ".join(f"{name} {value}" for name, value in minutes.items())
     return (
-        f"`lobstr-train DATA --out RUN --seed {config['seed']} --precision {config['precision']}`: "
-        f"the paper's recipe, {details['architecture']} ({details['parameters']:,} parameters), "
-        f"{details['steps_done']} steps of {config['batch']} windows of {config['window']} frames, "
-        f"loss on the last frame, drifting tracker errors, seed {config['seed']}, products in "
+        f"`lobstr-train DATA --out RUN --recipe {config['recipe']} --seed {config['seed']} "
+        f"--precision {config['precision']}`: {details['architecture']} "
+        f"({details['parameters']:,} parameters), {_how(config)}, "
+        f"{details['steps_done']:,} steps, seed {config['seed']}, products in "
         f"{config['precision']}, {details['wall_s'] / 60.0:.0f} minutes on one thread of a shared "
-        f"two-core machine. Split `{data['split']}` (`lobstr_hw/training/splits`), "
+        f"two-core machine; the weights of step {details['validation']['step']:,.0f}. Split "
+        f"`{data['split']}` (`lobstr_hw/training/splits`), "
         f"{data['clips']} clips or pieces of clips, {sum(minutes.values()):.0f} minutes before "
-        f"mirroring ({sets}). The step that ships is the last one; nothing was chosen on a test "
-        "part.\n\nScored by `python tools/predictor_results.py DATA OUT` (the same figures as "
-        "`lobstr-evaluate DATA --part PART [--mode windowed] [--predictor NAME]`): trackers from "
-        "the truth without noise, the true root, lengths on the 1.0 m skeleton. `network` is FK of "
-        "what was predicted, `after IK` the shown body with contact lock and floor; contact after "
-        f"IK is the lock. Measured {date.today().isoformat()}.\n"
+        f"mirroring ({sets}). Nothing was chosen on a test part.\n\n"
+        "Scored by `python tools/predictor_results.py DATA OUT --weights FILE.onnx` (the same "
+        "figures as `lobstr-evaluate DATA --part PART [--mode windowed] [--predictor NAME]`): "
+        "trackers from the truth without noise, the true root, lengths on the 1.0 m skeleton. "
+        "`network` is FK of what was predicted, `after IK` the shown body with contact lock and "
+        f"floor; contact after IK is the lock. Measured {date.today().isoformat()}.\n"
+    )
+
+
+def _how(config: dict[str, Any]) -> str:
+    if config["recipe"] == "paper":
+        return (
+            f"the paper's recipe: batches of {config['batch']} windows of {config['window']} "
+            "frames from a zero state, loss on the last frame, drifting tracker errors"
+        )
+    return (
+        f"state carried over long streams: {config['batch']} streams in chunks of "
+        f"{config['window']} frames, loss on every frame (docs/decisions.md)"
     )
 
 
@@ -158,7 +178,8 @@ def _by_set(tree: dict[str, Any]) -> str:
 
 def _replace(page: Path, section: str) -> None:
     text = page.read_text(encoding="utf-8") if page.is_file() else "# Results\n"
-    rest = re.sub(r"^## The predictor\n.*?(?=^## |\Z)", "", text, flags=re.DOTALL | re.MULTILINE)
+    heading = re.escape(section.splitlines()[0])
+    rest = re.sub(rf"^{heading}\n.*?(?=^## |\Z)", "", text, flags=re.DOTALL | re.MULTILINE)
     page.write_text(rest.rstrip() + "\n\n" + section, encoding="utf-8")
 
 
