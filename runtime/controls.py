@@ -14,6 +14,7 @@ from lobstr_hw.runtime.calibrating import TPoseWatcher
 from lobstr_hw.runtime.feed import Feed
 from lobstr_hw.runtime.gestures import Command, Gestures
 from lobstr_hw.runtime.session import Session
+from lobstr_hw.runtime.start_watch import StartWatch
 from lobstr_hw.runtime.ticks import Tick
 from lobstr_hw.trackers import TrackerRole, TrackerSample
 
@@ -47,6 +48,8 @@ class Controls:
         self._gestures = Gestures(feed.table.of)
         self._alarms = Alarms()
         self._was_calibrated = session.calibrated
+        profile = session.calibration  # made before this session, so it may not fit any more
+        self._start_watch = None if profile is None else StartWatch(profile)
         self._watcher: TPoseWatcher | None = None
         self._watch_until_s = 0.0
         self._next_devices_s = 0.0
@@ -59,7 +62,7 @@ class Controls:
         for command in self._gestures.add(tick.time_s, self._driver.events()):
             self._say(self._obey(command, tick.time_s))
         self._watch(tick.time_s, samples)
-        self._warn(tick.time_s)
+        self._warn(tick.time_s, samples)
 
     def _obey(self, command: Command, now_s: float) -> Spoken:
         if not self._session.calibrated:
@@ -128,10 +131,12 @@ class Controls:
         if found is not None or now_s >= self._watch_until_s:
             self._watcher = None
 
-    def _warn(self, now_s: float) -> None:
+    def _warn(self, now_s: float, samples: Sequence[TrackerSample]) -> None:
         if not self._session.calibrated:
             return
         said = self._alarms.trackers(now_s, self._feed.report(now_s))
+        if self._start_watch is not None and not self._start_watch.done:
+            said += self._start_watch.add(now_s, samples)
         if now_s >= self._next_devices_s:
             self._next_devices_s = now_s + DEVICES_EVERY_S
             said += self._alarms.batteries(self._driver.devices(), self._session.roles)

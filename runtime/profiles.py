@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from lobstr_hw.calibration import Calibration, load_profile
+from lobstr_hw.calibration import Calibration, check_devices, load_profile
 from lobstr_hw.calibration.profile import profile_from_json
 from lobstr_hw.drivers.driver import TrackerDriver
 from lobstr_hw.drivers.replay import ReplayDriver
@@ -32,11 +32,22 @@ def chosen_profile(
         ProfileError: it is missing or cannot be used.
     """
     if path is not None:
-        return load_profile(path)
+        return _checked(load_profile(path), driver)
     if isinstance(driver, ReplayDriver):
         data = driver.log.profile
         return None if data is None else profile_from_json(data.decode(), f"{driver.path}: profile")
     return _own_profile(default_profile_path(), driver, tell)
+
+
+def _checked(profile: Calibration, driver: TrackerDriver) -> Calibration:
+    """The profile, unless these are other devices, or the same in other places.
+
+    A driver that learns of its devices only while it listens has none yet, and nothing is checked.
+    """
+    seen = {device.serial: device.role_hint for device in driver.devices()}
+    if seen:
+        check_devices(profile, seen)
+    return profile
 
 
 def _own_profile(
