@@ -30,7 +30,10 @@ class Press:
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """One movement: ``shape`` (m,) of the time since its start, 0 at both ends, scales it."""
+    """One movement: ``shape`` of the time, 0 at its start and 1 at its end, scales it.
+
+    What the shape is at its end stays for good.
+    """
 
     kind: str
     start_s: float
@@ -62,11 +65,10 @@ class Script:
         R[:, Joint.RIGHT_UPPER_ARM] = rotation_z(lowered)
         p_hips = np.tile(body.offsets[0, Joint.HIPS], (len(times_s), 1))
         for move in self.moves:
-            x = (times_s - move.start_s) / (move.end_s - move.start_s)
-            during = (x > 0.0) & (x < 1.0)
-            if during.any():
-                amount = move.shape(x[during])
-                _MOVES[move.kind](amount, R, p_hips, during, size)
+            x = np.clip((times_s - move.start_s) / (move.end_s - move.start_s), 0.0, 1.0)
+            since = x > 0.0
+            if since.any():
+                _MOVES[move.kind](move.shape(x[since]), R, p_hips, since, size)
         return forward_kinematics(R, p_hips, body.offsets[0])
 
     def events(
@@ -126,13 +128,14 @@ def _bow(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
 
 
 def _walk(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
-    """Forward and back to the place, bobbing with every step."""
-    p[at, 2] += 0.8 * size * a
-    p[at, 1] -= 0.015 * size * (1.0 - np.cos(8.0 * np.pi * a)) / 2.0
+    """Three steps forward, bobbing with every one."""
+    p[at, 2] += 1.3 * size * a
+    p[at, 1] -= 0.015 * size * (1.0 - np.cos(6.0 * np.pi * a)) / 2.0
 
 
 def _turn(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
-    R[at, Joint.HIPS] = rotation_y(np.radians(70.0) * a) @ R[at, Joint.HIPS]
+    """Once round, on the spot."""
+    R[at, Joint.HIPS] = rotation_y(2.0 * np.pi * a) @ R[at, Joint.HIPS]
 
 
 def _reach_down(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
@@ -154,15 +157,15 @@ _MOVES: Mapping[str, Callable[[Array, Array, Array, Bools, float], None]] = {
 
 
 def _movement(start_s: float) -> tuple[Move, ...]:
-    """What a person does when asked to move: eight seconds."""
+    """What a person does when asked to move: ten seconds."""
     parts = (
-        ("nod", 1.6, _waves(2)),
-        ("shake", 1.2, _waves(1)),
-        ("twist", 1.6, _waves(2)),
-        ("wave", 1.2, _waves(1)),
-        ("bow", 1.8, _bump),
-        ("walk", 2.6, _bump),
-        ("turn", 2.0, _waves(1)),
+        ("nod", 1.4, _waves(2)),
+        ("shake", 1.0, _waves(1)),
+        ("twist", 1.4, _waves(2)),
+        ("wave", 1.0, _waves(1)),
+        ("bow", 1.4, _bump),
+        ("walk", 2.0, _smooth),
+        ("turn", 2.2, _smooth),
     )
     moves = []
     for kind, seconds, shape in parts:
@@ -173,9 +176,13 @@ def _movement(start_s: float) -> tuple[Move, ...]:
 
 SCRIPTS: Mapping[str, Script] = {
     "calibrate": Script(
-        arms=((0.0, 1.0), (4.0, 1.0), (5.0, 0.0), (8.5, 0.0), (9.5, 1.0)),
-        moves=_movement(10.5),
-        presses=(Press(_RIGHT, "trigger", 1.5, 1.7),),
+        arms=((0.0, 1.0), (2.0, 1.0), (2.8, 0.0), (6.2, 0.0), (7.0, 1.0)),
+        moves=_movement(7.4),
+        # agrees to the roles; then goes on as soon as each part of the movement is done
+        presses=tuple(
+            Press(_RIGHT, "trigger", time_s, time_s + 0.1)
+            for time_s in (0.8, 7.3, 9.9, 12.3, 13.7, 15.7, 17.9)
+        ),
     ),
     "gestures": Script(
         arms=((0.0, 0.0), (4.0, 0.0), (5.0, 1.0)),

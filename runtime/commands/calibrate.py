@@ -215,6 +215,7 @@ def _wizard(
         run_with_person(driver, wizard, front, HostClock(), stop, args.timeout)
         if wizard.done:
             front.say([spoken_result(wizard.person)])
+            front.show(wizard.view())
     return wizard.person if wizard.done else None
 
 

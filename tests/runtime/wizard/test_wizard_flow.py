@@ -176,7 +176,7 @@ def test_a_countdown_stands_before_every_step_that_measures(seconds: float) -> N
 
 
 def test_a_press_ends_the_countdown_and_nothing_more() -> None:
-    play = Play((StandStill, TakeTPose), countdown_s=30.0)
+    play = Play((StandStill, TakeTPose), FakeDriver(), countdown_s=30.0)
     play.run(1.0)
     play.run(1.1, [trigger()])
     assert play.wizard.view().countdown_s is None
@@ -184,14 +184,14 @@ def test_a_press_ends_the_countdown_and_nothing_more() -> None:
 
 
 def test_other_programs_can_lead_through_it() -> None:
-    play = Play()
+    play = Play(driver=FakeDriver())
     play.run(0.5)
     play.run(0.55, [command("calibrate_ready")])
     play.run(0.65, [command("calibrate_ready")])
     assert isinstance(play.wizard.stage, TakeTPose)
-    play.run(6.0)  # the arms are out since second 5
+    play.run(1.2)
     since_s = play.now_s
-    play.run(6.1, [command("calibrate_ready")])
+    play.run(1.3, [command("calibrate_ready")])
     play.run(20.0)
     t_pose = play.wizard.person.t_pose
     assert t_pose is not None
@@ -199,12 +199,12 @@ def test_other_programs_can_lead_through_it() -> None:
 
 
 def test_exec_begins_the_t_pose_anew() -> None:
-    play = Play((TakeTPose,))
-    play.run(6.0)
+    play = Play((TakeTPose,), FakeDriver())
+    play.run(0.8)
     play.run(20.0, [command("calibrate")])
     t_pose = play.wizard.person.t_pose
     assert t_pose is not None
-    assert t_pose.start_s >= 6.0
+    assert t_pose.start_s >= 0.8
 
 
 def test_nobody_is_nagged() -> None:

@@ -36,12 +36,15 @@ def shows_in_order(terminal: Terminal, *words: str) -> None:
 
 
 def test_a_person_is_led_through_it(tmp_path: Path) -> None:
-    path = tmp_path / "me.json"
-    with in_terminal(arguments(path)) as terminal:
-        assert terminal.finish() == 0, terminal.text
+    path, out = tmp_path / "me.json", tmp_path / "out.json"
+    with in_terminal(arguments(path, "--json"), stdout=out) as terminal:
+        assert terminal.finish(40.0) == 0, terminal.text
     shows_in_order(terminal, "1/", "Devices", "FAKE-PELVIS", "Stand still", "T-pose", "heading")
-    shows_in_order(terminal, "How well", str(path))
+    shows_in_order(terminal, "Got it", "Movement", "Nod", "Bow", "Turn", "Calibration is good")
     assert BELL in terminal.text
+    document = json.loads(out.read_text(encoding="utf-8"))
+    assert document["profile"] == str(path)
+    assert document["movement"]["missing"] == [], "a trigger press ends each part when it is done"
     assert set(load_profile(path).roles.values()) == set(FOUR_POINTS)
 
 
@@ -87,12 +90,3 @@ def test_ctrl_c_ends_cleanly_and_gives_the_terminal_back(tmp_path: Path) -> None
     assert "Traceback" not in terminal.text
     assert "\x1b[?25h" in terminal.text, "the cursor is back"
     assert not path.exists()
-
-
-def test_json_keeps_stdout_to_one_document(tmp_path: Path) -> None:
-    path, out = tmp_path / "me.json", tmp_path / "out.json"
-    with in_terminal(arguments(path, "--json"), stdout=out) as terminal:
-        assert terminal.finish() == 0, terminal.text
-    document = json.loads(out.read_text(encoding="utf-8"))
-    assert document["profile"] == str(path)
-    assert "Devices" in terminal.text
