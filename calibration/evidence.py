@@ -8,7 +8,7 @@ those of docs/calibration.md ("Movement"); those of measuring come on top.
 import numpy as np
 
 from lobstr_hw.calibration.axes import main_axis
-from lobstr_hw.calibration.orientation import Direction
+from lobstr_hw.calibration.orientation import Direction, Orientations, believable
 from lobstr_hw.calibration.phases import Phases, angular_velocity, rate_of
 from lobstr_hw.calibration.recording import RATE_HZ, Movement
 from lobstr_hw.predictors.predictor import Bools
@@ -43,15 +43,16 @@ _SWAY_M = 0.02  # of the hips from side to side, of a few steps
 
 
 def directions(
-    movement: Movement, p: Array, M: Array, phases: Phases
+    movement: Movement, p: Array, M: Array, phases: Phases, alone: Orientations
 ) -> tuple[list[Direction], dict[str, bool]]:
-    """All that was seen, and for each kind whether there was enough of it.
+    """All that was seen and can be believed, and for each kind whether there was enough of it.
 
     Args:
         movement: of the trackers.
         p: (m, 4, 3) the joints, roughly.
         M: (4, 3, 3) R_joint_tracker, roughly.
         phases: what was done when.
+        alone: what the T-pose says alone.
     """
     groups = {
         "upright": _upright(movement, phases, M),
@@ -62,6 +63,10 @@ def directions(
         "left bend": _hand_axis(movement, p, M, phases, LEFT, _Z, BEND),
         "right twist": _hand_axis(movement, p, M, phases, RIGHT, _X, TWIST),
         "right bend": _hand_axis(movement, p, M, phases, RIGHT, _Z, BEND),
+    }
+    groups = {
+        name: [direction for direction in group if believable(direction, alone)]
+        for name, group in groups.items()
     }
     found = [direction for group in groups.values() for direction in group]
     return found, {name: bool(group) for name, group in groups.items()}

@@ -218,18 +218,23 @@ def _trackers(x: Array, held: Array) -> Array:
     hips_height, trunk, arm, shoulders = _sizes(x)
     hips = np.stack([x[..., 4], hips_height, x[..., 5]], axis=-1)
     forward, left = np.moveaxis(x[..., _LEAN], -1, 0)
-    up = np.stack([left, np.sqrt(1.0 - forward**2 - left**2), forward], axis=-1)
+    up = np.stack([left, _rest(forward, left), forward], axis=-1)
     levers = np.array(x[..., _LEVERS]).reshape(*x.shape[:-1], 4, 3)
     levers[..., 0, :] += eyes_in_head(x[..., 0])
     levers = (held @ levers[..., None])[..., 0]
     joints = [hips + trunk[..., None] * up + levers[..., 0, :]]
     for i, side in enumerate((1.0, -1.0)):
         lift, ahead = x[..., 8 + 2 * i], x[..., 9 + 2 * i]
-        out = np.stack([side * np.sqrt(1.0 - lift**2 - ahead**2), lift, ahead], axis=-1)
+        out = np.stack([side * _rest(lift, ahead), lift, ahead], axis=-1)
         shoulder = hips + _SHOULDER_OF_TRUNK * trunk[..., None] * up
         width = side * shoulders[..., None] / 2.0 * np.array([1.0, 0.0, 0.0])
         joints.append(shoulder + width + arm[..., None] * out + levers[..., 1 + i, :])
     return np.stack([*joints, hips + levers[..., 3, :]], axis=-2)
+
+
+def _rest(a: Array, b: Array) -> Array:
+    """The third component of a unit vector; a pose that is none may ask for more than there is."""
+    return np.asarray(np.sqrt(np.maximum(1.0 - a**2 - b**2, 1e-4)))
 
 
 def _measures(x: Array, covariance: Array, misfit: float) -> Measures:

@@ -110,7 +110,7 @@ def refine_by_movement(
         for _ in range(_ROUNDS):
             p, phases = _phases(movement, fit)
             M = fit.orientations.R_joint_tracker
-            evidence, told = directions(movement, p, M, phases)
+            evidence, told = directions(movement, p, M, phases, before.orientations)
             usual = _usual(pose, fit.orientations)
             place = head_place(movement, M, phases, fit.measures.stature_m, usual)
             orientations = _oriented(pose, [*evidence, *place])

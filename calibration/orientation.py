@@ -21,9 +21,10 @@ from lobstr_hw.rotations import (
     transpose,
 )
 
-__all__ = ["Direction", "Orientations", "Place", "fit_orientations"]
+__all__ = ["Direction", "Orientations", "Place", "believable", "fit_orientations"]
 
 _STEPS = 4
+_SURPRISE = 3.0  # deviations
 _NOTHING = 1e3  # radians: no opinion
 
 
@@ -108,6 +109,17 @@ def fit_orientations(
     # r has unit variance whatever the weights are
     deviation = np.linalg.norm(gain, axis=1)[:12].reshape(4, 3)
     return Orientations(M, deviation, hands_heading_rad + psi)
+
+
+def believable(direction: Direction, alone: Orientations) -> bool:
+    """Within three deviations of what the T-pose alone says.
+
+    Beyond that somebody went sideways or looked at the floor: it is another movement than the one
+    that was asked for.
+    """
+    v = normalize(alone.R_joint_tracker[direction.joint] @ direction.seen)
+    room = np.hypot(direction.deviation, alone.deviation[direction.joint])
+    return bool(np.linalg.norm(np.cross(direction.axis, v) / room) < _SURPRISE)
 
 
 def _unit(i: int) -> Array:

@@ -13,7 +13,7 @@ from lobstr_hw.poses import frozen
 from lobstr_hw.rotations import Array
 from lobstr_hw.trackers import FOUR_POINTS, TrackerRole, TrackerSample
 
-__all__ = ["Check", "TPose", "TPoseDetector", "TPoseQuality"]
+__all__ = ["Check", "TPose", "TPoseDetector", "TPoseQuality", "quality_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +182,7 @@ class TPoseDetector:
         R = np.array([rest.R for rest in rests])
         spread_m = max(rest.spread_m for rest in rests)
         spread_rad = max(rest.spread_rad for rest in rests)
-        quality = self.latest = TPoseQuality(_checks(p, R, spread_m, spread_rad))
+        quality = self.latest = quality_of(p, R, spread_m, spread_rad)
         if self.best is None or quality.shortfall < self.best.shortfall:
             self.best = quality
         if not quality.ok:
@@ -191,6 +191,18 @@ class TPoseDetector:
         p = np.array([rest.p for rest in rests])
         start_s = end_s - self._window.length_s
         return TPose(tuple(serials), p, R, start_s, end_s, spread_m, spread_rad, quality)
+
+
+def quality_of(p: Array, R: Array, spread_m: float, spread_rad: float) -> TPoseQuality:
+    """How good a T-pose four trackers show.
+
+    Args:
+        p: (4, 3) above the floor, in the order of FOUR_POINTS.
+        R: (4, 3, 3).
+        spread_m: within which they wandered.
+        spread_rad: within which they turned.
+    """
+    return TPoseQuality(_checks(p, R, spread_m, spread_rad))
 
 
 def _checks(p: Array, R: Array, spread_m: float, spread_rad: float) -> tuple[Check, ...]:
