@@ -22,10 +22,10 @@ _FREE = np.inf
 
 UPRIGHT_PELVIS = np.deg2rad([2.0, 0.0, 1.5])
 """Pitch and roll of a pelvis, upright for a few seconds, off what the same person calls straight:
-clips of one recorded actor spread by 1.8 and 1.3."""
+clips of one recorded actor spread by 2.0 and 1.4 (tools/posture_spread.py)."""
 UPRIGHT_HEAD = np.deg2rad([2.3, 0.0, 1.8])
 WALKING_PELVIS = np.deg2rad(2.6)
-"""Yaw against the way: clips of one recorded actor spread by 2.6."""
+"""Yaw against the way: clips of one recorded actor spread by 3.0, whatever they were about."""
 WALKING_HEAD = np.deg2rad(2.5)
 NOD = np.deg2rad([0.0, 3.8, 3.8])
 SHAKE = np.deg2rad([6.0, 0.0, 4.5])
