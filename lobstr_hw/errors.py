@@ -8,12 +8,14 @@ LobstrError
 ├── CalibrationError
 │   ├── TPoseNotFound        nobody stood still in a T-pose
 │   ├── MissingRole          a role that is needed has no tracker
+│   ├── StationsNotSolved    what was seen does not tell where the base stations stand
 │   ├── SpacesNotJoined      how two tracking spaces lie to each other cannot be told
 │   └── ProfileError         a calibration profile cannot be used
 ├── FileFormatError
 │   ├── MotionFileError      a motion clip (BVH) cannot be read
 │   ├── UnknownRig           no table names the joints of this clip
-│   └── LogFileError         a tracker log cannot be read
+│   ├── LogFileError         a tracker log cannot be read
+│   └── StationFileError     a file of base stations cannot be used
 ├── ModelError               weights and code disagree
 └── OutputError              an output cannot be opened
 
@@ -34,6 +36,8 @@ __all__ = [
     "OutputError",
     "ProfileError",
     "SpacesNotJoined",
+    "StationFileError",
+    "StationsNotSolved",
     "TPoseNotFound",
     "TrackerNotFound",
     "UnknownRig",
@@ -80,6 +84,10 @@ class SpacesNotJoined(CalibrationError):
     """How two tracking spaces lie to each other cannot be told."""
 
 
+class StationsNotSolved(CalibrationError):
+    """What was seen does not tell where the base stations stand."""
+
+
 class FileFormatError(LobstrError):
     """A file is not what it should be."""
 
@@ -94,6 +102,10 @@ class UnknownRig(FileFormatError):
 
 class LogFileError(FileFormatError):
     """A tracker log cannot be read."""
+
+
+class StationFileError(FileFormatError):
+    """A file of base stations cannot be used."""
 
 
 class ModelError(LobstrError):

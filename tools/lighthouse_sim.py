@@ -23,9 +23,8 @@ from lobstr_hw.drivers.lighthouse.light import Station
 from lobstr_hw.poses import Pose
 from lobstr_hw.rotations import Array, from_quat_xyzw
 
-PERIODS = np.array(
-    [959000, 957000, 953000, 949000, 947000, 943000, 941000, 939000]
-    + [937000, 929000, 919000, 911000, 907000, 901000, 893000, 887000]
+PERIODS = 1000 * np.array(
+    [959, 957, 953, 949, 947, 943, 941, 939, 937, 929, 919, 911, 907, 901, 893, 887]
 )
 """Ticks of a turn of a Gen2 station, by channel."""
 STEP = TICKS_PER_S // 1000
@@ -85,7 +84,8 @@ def _model(name: str, config: dict[str, object]) -> DeviceModel:
     n = len(points)
     return DeviceModel(
         name, "simulated", "simulated", points, normals, np.arange(n), T_imu_trackref,
-        T_imu_trackref @ pose("trackref_from_head"), np.zeros(3), np.ones(3), np.zeros(3), np.ones(3),
+        T_imu_trackref @ pose("trackref_from_head"),
+        np.zeros(3), np.ones(3), np.zeros(3), np.ones(3),
     )  # fmt: skip
 
 

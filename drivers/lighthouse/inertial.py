@@ -88,7 +88,9 @@ def integrate(
     Args:
         imu: samples around the moments.
         ticks: (n,) rising; every sample between the first and the last should be among them.
-        p, v, R: at the first.
+        p: (3,) metres, at the first.
+        v: (3,) metres per second.
+        R: (3, 3) IMU frame to world.
         acc_bias: (3,) metres per second squared.
         gyro_bias: (3,) rad/s.
     """
@@ -104,7 +106,12 @@ def integrate(
 
 
 def gather(
-    model: DeviceModel, angles: Angles, imu: ImuSamples, moment: int, gyro_bias: Array
+    model: DeviceModel,
+    angles: Angles,
+    imu: ImuSamples,
+    moment: int,
+    gyro_bias: Array,
+    R: Array | None = None,
 ) -> Hits:
     """Hits around a moment, turned to it by the gyroscope.
 
@@ -114,16 +121,25 @@ def gather(
         imu: covering them.
         moment: ticks.
         gyro_bias: (3,) rad/s.
+        R: the device's rotation in a world with Y up at the moment, when it is roughly known. Then
+            the points are moved as it sped up and fell, too: 2 mm in 20 ms.
     """
     nodes = np.unique(np.concatenate([angles.ticks, [moment]]))
     between = imu.ticks[(imu.ticks > nodes[0]) & (imu.ticks < nodes[-1])]
     nodes = np.unique(np.concatenate([nodes, between]))
     _, gyro = at_ticks(imu, nodes)
-    R = turns(gyro - gyro_bias, np.diff(nodes) / TICKS_PER_S)
-    now = R[np.searchsorted(nodes, moment)]
-    turn = now.T @ R[np.searchsorted(nodes, angles.ticks)]  # (m, 3, 3)
+    turn = turns(gyro - gyro_bias, np.diff(nodes) / TICKS_PER_S)
+    now, hit = int(np.searchsorted(nodes, moment)), np.searchsorted(nodes, angles.ticks)
+    turn = turn[now].T @ turn
+    points = np.einsum("mij,mj->mi", turn[hit], model.points[angles.sensor])
+    if R is not None:
+        zero = np.zeros(3)
+        track = integrate(imu, nodes, zero, zero, R @ turn[0], zero, gyro_bias)
+        after = (nodes - moment)[:, None] / TICKS_PER_S
+        points = points + ((track.p - track.p[now] - after * track.v[now]) @ R)[hit]
+    turn = turn[hit]
     return Hits(
-        np.einsum("mij,mj->mi", turn, model.points[angles.sensor]),
+        points,
         np.einsum("mij,mj->mi", turn, model.normals[angles.sensor]),
         (angles.ticks - moment) / TICKS_PER_S,
         angles.station,

@@ -15,7 +15,7 @@ import numpy as np
 
 from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Angles, DeviceModel
 from lobstr_hw.drivers.lighthouse.inertial import STANDARD_GRAVITY, Track, rotation_steps
-from lobstr_hw.drivers.lighthouse.light import Stations, look
+from lobstr_hw.drivers.lighthouse.light import Flags, Stations, look
 from lobstr_hw.drivers.lighthouse.refine import Refined, cross_matrix
 from lobstr_hw.rotations import Array
 
@@ -204,7 +204,7 @@ def correct_with_light(
 
 def _light_residuals(
     state: FilterState, track: Track, angles: Angles, model: DeviceModel, stations: Stations
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Flags]:
     """Angles (m,) missed by, their derivative (m, 9) by the errors at the end, possible (m,)."""
     j = np.clip(np.searchsorted(track.ticks, angles.ticks, side="right") - 1, 0, None)
     dt = ((angles.ticks - track.ticks[j]) / TICKS_PER_S)[:, None]

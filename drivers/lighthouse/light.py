@@ -17,12 +17,12 @@ from lobstr_hw.drivers.lighthouse.reprojection import PLANE_TILT, reproject
 from lobstr_hw.poses import Pose
 from lobstr_hw.rotations import Array
 
-__all__ = ["Hits", "Station", "Stations", "join_angles", "look", "planes", "take_angles"]
+__all__ = ["Flags", "Hits", "Station", "Stations", "join_angles", "look", "planes", "take_angles"]
 
 Flags = NDArray[np.bool_]
 
 OFF_AXIS = math.tan(math.radians(70.0))
-"""Gen1 lights 60 degrees to each side, Gen2 75 to the sides and 55 up and down; beyond: reflections."""
+"""Gen1 lights 60 degrees to each side, Gen2 75 sideways and 55 up and down; beyond: reflections."""
 GEN2_ELEVATION = math.tan(math.radians(57.0))
 """At 60 degrees the tilted planes run parallel to the ray, and the model ends."""
 

@@ -18,6 +18,8 @@ __all__ = ["seed", "seed_with_rotation"]
 DIRECTIONS, SPINS = 60, 12
 """720 rotations, none further than some 25 degrees from any other: within reach of refining."""
 REFINED = 8
+CLEARLY_RIGHT_RAD = 1.5e-4
+"""A fit as good as the hits themselves: no need to look at the others."""
 SEEN_AT_LEAST = 0.7
 MINIMUM_HITS = 8
 MINIMUM_SENSORS = 4
@@ -48,8 +50,11 @@ def seed(stations: Stations, hits: Hits, evaluations: int = 40) -> Refined | Non
     """
     if len(hits) < MINIMUM_HITS or len(np.unique(hits.sensor)) < MINIMUM_SENSORS:
         return None
-    guesses = _ranked(stations, hits, _rotations())
-    fits = [refine(stations, hits, guess, 8) for guess in guesses]
+    fits: list[Refined] = []
+    for guess in _ranked(stations, hits, _rotations()):
+        fits.append(refine(stations, hits, guess, 8))
+        if fits[-1].rms_rad < CLEARLY_RIGHT_RAD and fits[-1].seen > 0.95:
+            break
     return _best(stations, hits, fits, evaluations)
 
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from lobstr_hw.drivers.lighthouse.light import Hits, Stations, look
+from lobstr_hw.drivers.lighthouse.light import Flags, Hits, Stations, look
 from lobstr_hw.rotations import Array, from_rotation_vector
 
 __all__ = ["Guess", "Refined", "cross_matrix", "move", "refine", "right_jacobian", "rms_rad"]
 
 HIT_SIGMA_RAD = 3e-4
-"""What real stations and sensors are good for; the stations' model itself is no better than 1e-4."""
+"""What real stations and sensors are good for; the stations' model is no better than 1e-4."""
 SPEED_SIGMA_M_S = 1.0
 """Hands move so fast; without it one station's 30 ms could not tell moving from lying elsewhere."""
 
@@ -66,7 +66,7 @@ def move(guess: Guess, x: Array) -> Guess:
     return Guess(guess.R @ from_rotation_vector(x[3:6]), guess.p + x[:3], guess.v + x[6:9])
 
 
-def residuals(stations: Stations, hits: Hits, guess: Guess) -> tuple[Array, Array, Array]:
+def residuals(stations: Stations, hits: Hits, guess: Guess) -> tuple[Array, Array, Flags]:
     """Angles (m,) too large, their derivative (m, 9) by position, rotation, velocity, and seen."""
     r = hits.points @ guess.R.T
     at = guess.p + r + hits.after_s[:, None] * guess.v

@@ -224,7 +224,7 @@ def _after_gap(imu: ImuSamples, begun: int, settings: TrackerSettings) -> int:
 
 
 def _nodes(imu: ImuSamples, begin_at: int, end: int, after: int) -> tuple[Ints, int]:
-    """Moments: the start, every sample in (start, end], and how many of them are up to ``after``."""
+    """Moments: the start, every sample in (start, end]; how many of them are up to ``after``."""
     i, j = np.searchsorted(imu.ticks, [begin_at, end], side="right")
     nodes = np.concatenate([[begin_at], imu.ticks[i:j]])
     return nodes, int(np.searchsorted(nodes, after, side="right"))
