@@ -11,21 +11,30 @@ import datetime
 import importlib.util
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from pathlib import Path
 
 import numpy as np
 
-from lobstr_hw.calibration import TPoseDetector, movement_from_samples, refine_by_movement
-from lobstr_hw.calibration.self_check import check_calibration
+from lobstr_hw.calibration import (
+    TPoseDetector,
+    check_calibration,
+    check_start,
+    movement_from_samples,
+    refine_by_movement,
+)
 from lobstr_hw.motion import Motion
+from lobstr_hw.poses import Pose
+from lobstr_hw.rotations import from_rotation_vector
 from lobstr_hw.simulation import (
     Habits,
     PoseDeviation,
     SimulatedTake,
+    SimulatedUser,
     Sway,
     calibrating_movement,
+    drawn_user,
     simulate,
     take_samples,
 )
@@ -202,6 +211,70 @@ def lost(seed: int) -> Outcome:
     return outcome(unseen(_good_take(seed), int(_rng(seed).integers(4))))
 
 
+def at_start(change: Callable[[SimulatedUser, int], SimulatedUser]) -> Callable[[int], Outcome]:
+    """The one-second check, some time after the calibration, with something changed since."""
+
+    def case(seed: int) -> Outcome:
+        take = _good_take(seed)
+        samples = list(take_samples(take))
+        own = {serial: role for role, serial in take.serials.items()}
+        pose = TPoseDetector(own).add(samples)
+        if pose is None:
+            return Outcome(True, "T-pose", "not found")
+        movement = movement_from_samples(samples, pose.serials, pose.end_s)
+        profile = refine_by_movement(pose, movement).calibration
+        rng = np.random.default_rng([seed, 12])
+        hanging = np.deg2rad(rng.normal(-72.0, 5.0, 2))
+        deviation = arms_off_level(
+            PoseDeviation.drawn(rng, np.deg2rad(7.0)), (float(hanging[0]), float(hanging[1]))
+        )
+        standing = t_pose_motion(1.2, RATE_HZ, deviation, Sway(), rng)
+        later = simulate(standing, seed + 77_000_000, user=change(take.user, seed), t_pose_s=0.0)
+        second = movement_from_samples(
+            take_samples(later), [take.serials[role] for role in FOUR_POINTS]
+        )
+        check = check_start(profile, second)
+        stage = "start check" if check.standing else "not standing"
+        return Outcome(not check.ok, stage, check.failed[0].name if check.failed else "")
+
+    return case
+
+
+def _same(user: SimulatedUser, seed: int) -> SimulatedUser:
+    return user
+
+
+def _lower(user: SimulatedUser, seed: int) -> SimulatedUser:
+    return _strapped(user, np.array([0.0, -0.05, 0.0]), np.zeros(3))
+
+
+def _round_the_belt(user: SimulatedUser, seed: int) -> SimulatedUser:
+    return _strapped(user, np.array([0.06, 0.0, -0.02]), np.array([0.0, 0.5, 0.0]))
+
+
+def _turned(user: SimulatedUser, seed: int) -> SimulatedUser:
+    return _strapped(user, np.zeros(3), any_direction(_rng(seed), np.deg2rad(20.0)))
+
+
+def _strapped(user: SimulatedUser, shift: np.ndarray, turn: np.ndarray) -> SimulatedUser:
+    """The pelvis tracker elsewhere on the pelvis."""
+    T = user.mounts[TrackerRole.PELVIS]
+    moved = Pose(from_rotation_vector(turn) @ T.R, T.p + shift)
+    return replace(user, mounts={**user.mounts, TrackerRole.PELVIS: moved})
+
+
+def _hands_exchanged(user: SimulatedUser, seed: int) -> SimulatedUser:
+    left, right = TrackerRole.LEFT_HAND, TrackerRole.RIGHT_HAND
+    return replace(
+        user, serials={**user.serials, left: user.serials[right], right: user.serials[left]}
+    )
+
+
+def _somebody_else(user: SimulatedUser, seed: int) -> SimulatedUser:
+    other = drawn_user(seed + 1)
+    return replace(user, body=other.body, stature_m=other.stature_m)
+
+
 KINDS: dict[str, Callable[[int], Outcome]] = {
     "good": good,
     "roles exchanged": exchanged,
@@ -210,6 +283,12 @@ KINDS: dict[str, Callable[[int], Outcome]] = {
     "a tracker moved by 3 cm in the pose": shifted,
     "a tracker turned by 10 degrees in the pose": twisted,
     "one tracker not tracked": lost,
+    "start check, nothing changed": at_start(_same),
+    "start check, pelvis tracker 5 cm lower": at_start(_lower),
+    "start check, pelvis tracker 6 cm round the belt": at_start(_round_the_belt),
+    "start check, pelvis tracker turned by 20 degrees": at_start(_turned),
+    "start check, hands exchanged": at_start(_hands_exchanged),
+    "start check, another person": at_start(_somebody_else),
 }
 
 
@@ -219,8 +298,9 @@ def _head(args: argparse.Namespace) -> str:
     return f"""{TITLE}
 
 Simulated users as under Calibration. A case is rejected when no T-pose is accepted, or when the
-self-check after the movement says no; the reason that is counted is the worst check. Intervals are
-Wilson's.
+self-check after the movement says no; the reason that is counted is the worst check. Start check:
+one second of standing with hanging arms, some time later; rejected means that it warns. Intervals
+are Wilson's.
 
 `{command}`, {date}.
 """
