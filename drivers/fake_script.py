@@ -112,7 +112,7 @@ def _shake(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
 
 def _twist(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
     for hand in (Joint.LEFT_HAND, Joint.RIGHT_HAND):
-        R[at, hand] = R[at, hand] @ rotation_x(np.radians(60.0) * a) @ rotation_y(0.4 * a)
+        R[at, hand] = R[at, hand] @ rotation_x(np.radians(60.0) * a)
 
 
 def _wave(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
@@ -177,11 +177,11 @@ def _movement(start_s: float) -> tuple[Move, ...]:
 SCRIPTS: Mapping[str, Script] = {
     "calibrate": Script(
         arms=((0.0, 1.0), (2.0, 1.0), (2.8, 0.0), (6.2, 0.0), (7.0, 1.0)),
-        moves=_movement(7.4),
+        moves=_movement(7.1),
         # agrees to the roles; then goes on as soon as each part of the movement is done
         presses=tuple(
             Press(_RIGHT, "trigger", time_s, time_s + 0.1)
-            for time_s in (0.8, 7.3, 9.9, 12.3, 13.7, 15.7, 17.9)
+            for time_s in (0.8, 6.6, 9.6, 12.0, 13.4, 15.4, 17.7)
         ),
     ),
     "gestures": Script(

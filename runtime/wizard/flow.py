@@ -179,6 +179,8 @@ class Wizard:
 
     def view(self) -> View:
         """What there is to see now."""
+        if self.done:
+            return View("Done", (len(self._plan), len(self._plan)), "Done.")
         stage = self.stage
         return View(
             title=stage.title,
