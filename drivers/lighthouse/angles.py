@@ -5,6 +5,7 @@ Frames: a device's IMU frame; a station's own frame (X right, Y up, it looks alo
 radians, g.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -48,6 +49,19 @@ class Angles:
     def __len__(self) -> int:
         """Number of hits."""
         return len(self.ticks)
+
+    @staticmethod
+    def join(parts: Sequence["Angles"]) -> "Angles":
+        """All hits, one part after the other; none of no parts."""
+        none = np.zeros(0, dtype=np.int64)
+        parts = [Angles(none, none, none, none, np.zeros(0)), *parts]
+        return Angles(
+            ticks=np.concatenate([part.ticks for part in parts]),
+            station=np.concatenate([part.station for part in parts]),
+            axis=np.concatenate([part.axis for part in parts]),
+            sensor=np.concatenate([part.sensor for part in parts]),
+            angle_rad=np.concatenate([part.angle_rad for part in parts]),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

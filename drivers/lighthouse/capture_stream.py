@@ -3,7 +3,7 @@
 import gzip
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import IO, cast
 
@@ -14,6 +14,8 @@ __all__ = ["LONGEST", "CutShort", "open_capture", "take"]
 LONGEST = 1 << 20
 """Bytes of the longest record that is believed: USB packets here have 64, strings a few hundred."""
 GZIP_MAGIC = b"\x1f\x8b"
+MOST_LAYERS = 3
+"""Some captures were compressed and put away compressed once more."""
 
 
 class CutShort(Exception):
@@ -28,16 +30,24 @@ def open_capture(path: Path) -> Iterator[IO[bytes]]:
         FileFormatError: there is no such file or it cannot be opened.
     """
     try:
-        with path.open("rb") as packed:
-            is_gzip = packed.read(2) == GZIP_MAGIC
-            packed.seek(0)
-            if not is_gzip:
-                yield packed
-                return
-            with gzip.open(packed) as unpacked:
-                yield cast(IO[bytes], unpacked)
+        with ExitStack() as opened:
+            stream: IO[bytes] = opened.enter_context(path.open("rb"))
+            for _ in range(MOST_LAYERS):
+                is_gzip = _starts(stream) == GZIP_MAGIC
+                stream.seek(0)
+                if not is_gzip:
+                    break
+                stream = cast(IO[bytes], opened.enter_context(gzip.open(stream)))
+            yield stream
     except OSError as error:
         raise FileFormatError(f"{path}: cannot be read: {error}") from error
+
+
+def _starts(stream: IO[bytes]) -> bytes:
+    try:
+        return take(stream, len(GZIP_MAGIC))
+    except CutShort:
+        return b""
 
 
 def take(stream: IO[bytes], count: int) -> bytes:

@@ -1,14 +1,9 @@
 """Reports of one device -> its raw events: samples sorted, repeats dropped, times unwrapped."""
 
-from collections.abc import Sequence
-
-import numpy as np
-
-from lobstr_hw.drivers.lighthouse.angles import Ints
 from lobstr_hw.drivers.lighthouse.compact_light import parse_compact_light
 from lobstr_hw.drivers.lighthouse.gen2_words import SyncWord, parse_words
 from lobstr_hw.drivers.lighthouse.radio import Inputs, RadioMessage, parse_message
-from lobstr_hw.drivers.lighthouse.raw_events import RawEvents
+from lobstr_hw.drivers.lighthouse.raw_events import EventLists, RawEvents
 from lobstr_hw.drivers.lighthouse.reports import (
     BeamReport,
     GoneReport,
@@ -25,6 +20,9 @@ __all__ = ["OLD_RADIO", "DeviceReader"]
 
 OLD_RADIO = frozenset({0x2012, 0x2022})
 """Product ids of wand and Tracker 1.0, which keep to the old radio protocol and to Gen1."""
+IN_FLIGHT = 20
+"""Radio messages after a change of the light mode whose light may still be of the old one."""
+HALF_ROUND = 128
 SHORTEST_LIGHT = 4
 """Bytes: a time and at least something before it."""
 
@@ -41,15 +39,16 @@ class DeviceReader:
         unreadable: radio messages and light data that made no sense.
     """
 
-    def __init__(self, old_radio: bool, gen2_mode: bool = True) -> None:
+    def __init__(self, old_radio: bool, gen2_light: bool) -> None:
         """Nothing was heard.
 
         Args:
             old_radio: which radio protocol, by OLD_RADIO; nothing by cable.
-            gen2_mode: the light mode that the device was set to; the old radio protocol has none.
+            gen2_light: the light mode that the device was set to, by radio; a cable's reports tell.
         """
         self._old_radio = old_radio
-        self.gen2_mode = gen2_mode and not old_radio
+        self._gen2_light = gen2_light and not old_radio
+        self._in_flight = 0
         self._ticks = Ticks()
         self._sequence: int | None = None
         self.battery: float | None = None
@@ -57,14 +56,7 @@ class DeviceReader:
         self.inputs: Inputs | None = None
         self.sees_gen2 = self.gone = False
         self.unreadable = 0
-        self._clear()
-
-    def _clear(self) -> None:
-        self._imu: list[tuple[int, ...]] = []
-        self._pulses: list[tuple[int, ...]] = []
-        self._syncs: list[tuple[int, ...]] = []
-        self._sweeps: list[tuple[int, ...]] = []
-        self._syncs_before: list[int] = []
+        self._lists = EventLists()
 
     def feed(self, data: bytes) -> None:
         """One input report; what is no report of such a device is left alone."""
@@ -84,31 +76,34 @@ class DeviceReader:
             case GoneReport():
                 self.gone = True
 
+    def use_old_radio(self) -> None:
+        """It turned out to be a device of the old radio protocol."""
+        self._old_radio, self._gen2_light = True, False
+
+    def switch_light(self, gen2: bool) -> None:
+        """The device was told to change its light mode; by radio, some light is lost with it."""
+        if gen2 != self._gen2_light and not self._old_radio:
+            self._gen2_light, self._in_flight = gen2, IN_FLIGHT
+
     def take(self) -> RawEvents:
         """What was heard since the last call."""
-        events = RawEvents(
-            imu=_table(self._imu, 7),
-            pulses=_table(self._pulses, 3),
-            syncs=_table(self._syncs, 4),
-            sweeps=_table(self._sweeps, 4),
-            syncs_before=np.array(self._syncs_before, dtype=np.int64),
-        )
-        self._clear()
-        return events
+        lists, self._lists = self._lists, EventLists()
+        return lists.events()
 
     def _add_imu(self, slots: tuple[ImuSlot, ...]) -> None:
         """The samples that are newer than the last one: sequence numbers go round at 256."""
-        last = slots[0][0] - 128 if self._sequence is None else self._sequence
+        newest = self._sequence
+        last = slots[0][0] - HALF_ROUND if newest is None else newest
         for age, slot in sorted(((slot[0] - last) & 0xFF, slot) for slot in slots):
-            if 0 < age < 128 or self._sequence is None:
+            if newest is None or 0 < age < HALF_ROUND:
                 self._sequence = slot[0]
-                self._imu.append((self._ticks.imu(slot[1]), *slot[2]))
+                self._lists.imu.append((self._ticks.imu(slot[1]), *slot[2]))
 
     def _add_pulses(self, pulses: tuple[tuple[int, int, int], ...]) -> None:
         for port, low, length in pulses:
             start = self._ticks.light(low, 32)
             if start is not None:
-                self._pulses.append((port, start, length))
+                self._lists.pulses.append((port, start, length))
 
     def _add_words(self, data: bytes) -> None:
         for word in parse_words(data):
@@ -116,33 +111,30 @@ class DeviceReader:
             if ticks is None:
                 continue
             if isinstance(word, SyncWord):
-                self._syncs.append((word.channel, ticks, word.data_bit, word.g_bit))
+                self._lists.syncs.append((word.channel, ticks, word.data_bit, word.g_bit))
             else:
-                self._sweeps.append((word.channel, word.port, ticks, word.half_tick))
-                self._syncs_before.append(len(self._syncs))
+                self._lists.add_sweep((word.channel, word.port, ticks, word.half_tick))
 
     def _add_message(self, message: RadioMessage | None) -> None:
         if message is None:
             self.unreadable += 1
             return
         if message.imu is not None:
-            self._imu.append((self._ticks.imu(message.ticks), *message.imu))
+            self._lists.imu.append((self._ticks.imu(message.ticks), *message.imu))
         if message.battery is not None:
             self.battery, self.charging = message.battery, message.charging
         self.inputs = message.inputs or self.inputs
-        if len(message.light) >= SHORTEST_LIGHT:
+        if self._in_flight:
+            self._in_flight -= 1
+        elif len(message.light) >= SHORTEST_LIGHT:
             self._add_radio_light(message.light)
 
     def _add_radio_light(self, light: bytes) -> None:
-        if self.gen2_mode:
+        if self._gen2_light:
             self._add_words(light)
             return
         last_edge = self._ticks.light(int.from_bytes(light[-3:], "little"), 24)
         if last_edge is not None:
             pulses = parse_compact_light(light, last_edge)
-            self._pulses += pulses
+            self._lists.pulses += pulses
             self.unreadable += not pulses
-
-
-def _table(rows: Sequence[tuple[int, ...]], columns: int) -> Ints:
-    return np.array(rows, dtype=np.int64).reshape(-1, columns)

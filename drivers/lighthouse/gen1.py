@@ -1,8 +1,8 @@
 """Pulses of Gen1 stations -> OOTX bits and angles.
 
-A pulse does not say whose it is: the rhythm of the stations does (gen1_pattern.py). While the rhythm
-is known, pulses are taken half-turn by half-turn: those at the expected times and as long as a
-flash are flashes, the others sweeps of the one station whose turn it is. How long after that
+A pulse does not say whose it is: the rhythm of the stations does (gen1_pattern.py). While the
+rhythm is known, pulses are taken half-turn by half-turn: those at the expected times and as long as
+a flash are flashes, the others sweeps of the one station whose turn it is. How long after that
 station's own flash a sensor was hit is the angle.
 """
 
@@ -23,6 +23,7 @@ from lobstr_hw.drivers.lighthouse.gen1_pattern import (
     flash_error,
     merge_flashes,
 )
+from lobstr_hw.drivers.lighthouse.ootx import StationBits
 
 __all__ = ["Gen1Decoder"]
 
@@ -36,13 +37,15 @@ FLASH_LATE, FLASH_OFF = 2_500, 800
 """A flash that starts so much late is a reflection; one this far off its time means doubt."""
 SWEEP_TICKS = (30_000, 370_000)
 """After its flash a sweep is in the room; beyond +-76 degrees a station has no light."""
-SWEEP_LENGTHS = (100, 10_000)
+SWEEP_LENGTHS = (50, 10_000)
+"""A sensor at the edge of the light has short pulses: 53 ticks were seen to be good."""
 MEAN_BELOW, MEAN_ABOVE = 4.0, 3.0
 """Pulses under a quarter and over three times the mean length of a sweep are no part of it."""
 SURE, HIT, MISS = 100, 1, 3
 AT_FIRST = 20
 GIVEN_UP = 240
 """Half-turns (2 s) without a flash after which the rhythm is looked for again."""
+MOVES_ALONG = 16
 TRIED_EVERY, LOOKED_AT = 16, 512
 """New pulses between two attempts to find the rhythm, and how many are looked at."""
 NEWEST_FLASHES = 20
@@ -50,41 +53,45 @@ NEWEST_FLASHES = 20
 
 @dataclass(slots=True)
 class _Found:
-    """What a batch gives, half-turn by half-turn."""
+    """What a batch gives, half-turn by half-turn; by station, its bits."""
 
     angles: list[Angles] = field(default_factory=list)
+    told: list[StationBits] = field(default_factory=list)
     bits: dict[int, list[int | None]] = field(default_factory=lambda: {0: [], 1: []})
+    fresh: bool = False
+
+    def close(self, fresh: bool) -> None:
+        """The bits until now belong together; the next do not belong to them, if ``fresh``."""
+        self.told += [
+            StationBits(k, tuple(bits), self.fresh) for k, bits in self.bits.items() if bits
+        ]
+        self.bits, self.fresh = {0: [], 1: []}, fresh
 
 
 @dataclass(slots=True)
 class _Lock:
     """The rhythm, and where in it the next half-turn is.
 
-    ``due``: when each station's next flash begins, by station.
+    ``due``: when each station's next flash begins, by station; ``missed``: how many in a row were.
     """
 
     rhythm: Rhythm
     due: dict[int, int]
     confidence: int = AT_FIRST
-    unseen: int = 0
+    missed: dict[int, int] = field(default_factory=lambda: {0: 0, 1: 0})
 
 
 class Gen1Decoder:
-    """Angles of one device from the Gen1 stations that it sees; how batches are cut is no matter.
-
-    Attributes:
-        restarts: how often the rhythm was found; the bits of OOTX frames begin anew with each.
-    """
+    """Angles of one device from the Gen1 stations it sees; how batches are cut is no matter."""
 
     def __init__(self) -> None:
         """Nothing was seen."""
         self._waiting: Ints = np.zeros((0, 3), dtype=np.int64)
         self._tried = 0
         self._lock: _Lock | None = None
-        self.restarts = 0
 
-    def decode(self, pulses: Ints) -> tuple[Angles, dict[int, list[int | None]]]:
-        """The hits of a batch and, by station, its OOTX bits: one a flash, None where it was missed.
+    def decode(self, pulses: Ints) -> tuple[Angles, list[StationBits]]:
+        """The hits of a batch and the stations' OOTX bits.
 
         Args:
             pulses: (n, 3) port, start, length. A half-turn is decoded when pulses of the next are
@@ -95,13 +102,14 @@ class Gen1Decoder:
             self._waiting = np.concatenate([self._waiting, pulses[first : first + SLICE]])
             while self._next(found):
                 pass
-        return _join(found.angles), found.bits
+        found.close(fresh=False)
+        return Angles.join(found.angles), found.told
 
     def _next(self, found: _Found) -> bool:
         """One step; False: more pulses are needed."""
         lock = self._lock
         if lock is None:
-            return self._find()
+            return self._find(found)
         end = lock.rhythm.start + HALF_TURN - MARGIN
         newest = np.maximum.accumulate(self._waiting[:, 1])
         here = int(np.searchsorted(newest, end + LATE))
@@ -111,11 +119,11 @@ class Gen1Decoder:
         before = head[:, 1] < end
         self._waiting = np.concatenate([head[~before], rest])
         _half_turn(lock, head[before & (head[:, 1] >= end - HALF_TURN)], found)
-        if lock.confidence < 0 or lock.unseen > GIVEN_UP:
+        if lock.confidence < 0 or min(lock.missed[k] for k in lock.due) > GIVEN_UP:
             self._lock, self._tried = None, 0
         return True
 
-    def _find(self) -> bool:
+    def _find(self, found: _Found) -> bool:
         """Look for the rhythm among the pulses that wait, a few more at a time."""
         if len(self._waiting) < self._tried + TRIED_EVERY:
             return False
@@ -130,7 +138,7 @@ class Gen1Decoder:
             return True
         self._lock = _lock_at(rhythm, flashes[0].start)
         self._tried = 0
-        self.restarts += 1
+        found.close(fresh=True)
         return True
 
 
@@ -162,18 +170,25 @@ def _half_turn(lock: _Lock, pulses: Ints, found: _Found) -> None:
             lock.confidence += HIT if station in seen else -MISS
         found.bits[station].append(bit)
     lock.confidence = min(lock.confidence, SURE)
-    lock.unseen = 0 if seen else lock.unseen + 1
-    flashes = _predicted(due, seen)
+    flashes = _predicted(lock, seen)
     found.angles.append(_sweep(rhythm, pulses[free], flashes[rhythm.sweeping]))
     lock.due = {station: start + HALF_TURN for station, start in flashes.items()}
     lock.rhythm = rhythm.next(min(lock.due.values()))
 
 
-def _predicted(due: dict[int, int], seen: dict[int, int]) -> dict[int, int]:
-    """When each flash began; one that was missed keeps its distance to the other."""
-    late = [start - due[station] for station, start in seen.items()]
-    shift = late[0] if late else 0
-    return {station: seen.get(station, when + shift) for station, when in due.items()}
+def _predicted(lock: _Lock, seen: dict[int, int]) -> dict[int, int]:
+    """When each flash began: one that was missed is where it was due.
+
+    The stations' clocks and the device's differ by some 30 ppm, 10 ticks a half-turn: one that is
+    out of sight for long moves along with the other.
+    """
+    late = [start - lock.due[station] for station, start in seen.items()]
+    flashes = {}
+    for station, due in lock.due.items():
+        lock.missed[station] = 0 if station in seen else lock.missed[station] + 1
+        moved = late[0] if late and lock.missed[station] > MOVES_ALONG else 0
+        flashes[station] = seen.get(station, due + moved)
+    return flashes
 
 
 def _sweep(rhythm: Rhythm, pulses: Ints, flash: int) -> Angles:
@@ -194,17 +209,5 @@ def _sweep(rhythm: Rhythm, pulses: Ints, flash: int) -> Angles:
         station=rhythm.sweeping * same,
         axis=rhythm.axis * same,
         sensor=pulses[:, 0],
-        angle_rad=passed * (math.pi / HALF_TURN) - math.pi / 2,
-    )
-
-
-def _join(parts: list[Angles]) -> Angles:
-    none = np.zeros(0, dtype=np.int64)
-    parts = [Angles(none, none, none, none, np.zeros(0)), *parts]
-    return Angles(
-        ticks=np.concatenate([part.ticks for part in parts]),
-        station=np.concatenate([part.station for part in parts]),
-        axis=np.concatenate([part.axis for part in parts]),
-        sensor=np.concatenate([part.sensor for part in parts]),
-        angle_rad=np.concatenate([part.angle_rad for part in parts]),
+        angle_rad=np.float64(math.pi / HALF_TURN) * passed - math.pi / 2,
     )

@@ -37,7 +37,7 @@ class Flash:
 
 @dataclass(frozen=True, slots=True)
 class Rhythm:
-    """A place in the rhythm: half-turn number ``half`` begins at ``start``, with the first flash."""
+    """A place in the rhythm: half-turn ``half`` begins at ``start``, with the first flash."""
 
     alone: bool
     half: int
@@ -83,7 +83,7 @@ def flash_error(length: int, axis: int, skip: bool) -> int:
 
 
 def merge_flashes(pulses: Sequence[tuple[int, int]]) -> list[Flash]:
-    """Pulses (start, length), by their start, that overlap and are as long as flashes: one flash."""
+    """Pulses (start, length), by their start, that overlap and are as long as a flash: one."""
     flashes: list[Flash] = []
     for start, length in pulses:
         if not SHORTEST <= length <= LONGEST:

@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Angles, Ints
+from lobstr_hw.drivers.lighthouse.ootx import StationBits
 from lobstr_hw.drivers.lighthouse.raw_events import RawEvents
 from lobstr_hw.rotations import Array
 
-__all__ = ["PERIODS", "Gen2Decoder", "Gen2Turns"]
+__all__ = ["PERIODS", "Gen2Decoder"]
 
 # fmt: off
 PERIODS = (
@@ -37,18 +38,6 @@ BLIND = 0.05 * math.pi
 """So close to it a plane cannot be guessed."""
 NEAR_RAD = 0.1
 RECENT_TICKS = TICKS_PER_S // 10
-
-
-@dataclass(frozen=True, slots=True)
-class Gen2Turns:
-    """OOTX bits of a station, one a turn; None: the turn's sync was missed.
-
-    ``fresh``: the bits before were of another time; whoever reads the bits begins anew.
-    """
-
-    station: int
-    bits: tuple[int | None, ...]
-    fresh: bool
 
 
 @dataclass(slots=True)
@@ -76,31 +65,25 @@ class _Station:
 
 
 class Gen2Decoder:
-    """Angles of one device from all Gen2 stations that it sees; how batches are cut is no matter."""
+    """Angles of one device from all Gen2 stations it sees; how batches are cut is no matter."""
 
     def __init__(self) -> None:
         """No station was seen."""
         self._stations: dict[int, _Station] = {}
 
-    def decode(self, events: RawEvents) -> tuple[Angles, list[Gen2Turns]]:
+    def decode(self, events: RawEvents) -> tuple[Angles, list[StationBits]]:
         """The hits of a batch, and the OOTX bits of every station.
 
         Hits that cannot be told apart, or without a recent sync, are left out. ``Angles.sensor``
         has hardware ports here; ``decoding.DeviceDecoder`` knows whose they are.
         """
         parts: list[tuple[Ints, Ints, Array]] = []
-        turns: list[Gen2Turns] = []
+        turns: list[StationBits] = []
         for channel in np.unique(np.concatenate([events.syncs[:, 0], events.sweeps[:, 0]])):
             station = self._stations.setdefault(int(channel), _Station(int(channel)))
             rows = np.flatnonzero(events.sweeps[:, 0] == channel)
-            began = (station.start, station.period)
-            syncs, told = _take_turns(station, events.syncs)
+            told, turned = _turned(station, events, rows)
             turns += told
-            starts = np.array([np.nan if began[0] is None else began[0], *syncs[:, 1]])
-            periods = np.array([began[1] or np.nan, *syncs[:, 2]])
-            last = np.searchsorted(syncs[:, 0], events.syncs_before[rows], side="left")
-            ticks = events.sweeps[rows, 2]
-            turned = (ticks + events.sweeps[rows, 3] / 2 - starts[last]) / periods[last]
             good = (turned >= 0) & (turned < MOST_TURNS)
             rows, turned = rows[good], 2 * math.pi * (turned[good] % 1.0)
             planes = _planes(station, events.sweeps[rows, 2], turned)
@@ -110,10 +93,21 @@ class Gen2Decoder:
         return _join(events, parts), turns
 
 
-def _take_turns(station: _Station, syncs: Ints) -> tuple[Array, list[Gen2Turns]]:
+def _turned(station: _Station, events: RawEvents, rows: Ints) -> tuple[list[StationBits], Array]:
+    """A station's bits, and how many turns after its last sync each of its sweeps was."""
+    start, period = station.start, station.period
+    syncs, told = _take_turns(station, events.syncs)
+    starts = np.array([math.nan if start is None else start, *syncs[:, 1]])
+    periods = np.array([period or math.nan, *syncs[:, 2]])
+    last = np.searchsorted(syncs[:, 0], events.syncs_before[rows], side="left")
+    ticks = events.sweeps[rows, 2] + events.sweeps[rows, 3] / 2
+    return told, (ticks - starts[last]) / periods[last]
+
+
+def _take_turns(station: _Station, syncs: Ints) -> tuple[Array, list[StationBits]]:
     """A station's syncs of a batch: (n, 3) place in the batch, start, period; and their bits."""
     rows: list[tuple[float, float, float]] = []
-    told: list[Gen2Turns] = []
+    told: list[StationBits] = []
     bits: list[int | None] = []
     fresh = False
     for at in np.flatnonzero(syncs[:, 0] == station.channel):
@@ -121,11 +115,11 @@ def _take_turns(station: _Station, syncs: Ints) -> tuple[Array, list[Gen2Turns]]
         if turns is None:
             continue
         if turns == 0:
-            told += [Gen2Turns(station.channel, tuple(bits), fresh)] if bits else []
+            told += [StationBits(station.channel, tuple(bits), fresh)] if bits else []
             bits, fresh = [], True
         bits += [None] * (turns - 1) + [int(syncs[at, 2])]
         rows.append((float(at), float(syncs[at, 1]), station.period))
-    told += [Gen2Turns(station.channel, tuple(bits), fresh)] if bits else []
+    told += [StationBits(station.channel, tuple(bits), fresh)] if bits else []
     return np.array(rows).reshape(-1, 3), told
 
 
@@ -133,7 +127,7 @@ def _planes(station: _Station, ticks: Ints, turned: Array) -> Ints:
     """Which plane hit; -1: nobody knows. Near half a turn the latest hits of each plane decide."""
     planes = np.where(turned < math.pi, 0, 1)
     seen = 0
-    for at in np.flatnonzero(np.abs(turned - math.pi) < UNSURE):
+    for at in np.flatnonzero(np.abs(turned - math.pi) < UNSURE).tolist():
         _remember(station, ticks[seen:at], planes[seen:at], turned[seen:at])
         planes[at] = _guess(station, int(ticks[at]), float(turned[at]))
         seen = at
@@ -163,8 +157,7 @@ def _guess(station: _Station, ticks: int, turned: float) -> int:
 def _join(events: RawEvents, parts: list[tuple[Ints, Ints, Array]]) -> Angles:
     """The hits of all stations, in the order in which the device told them."""
     if not parts:
-        none = np.zeros(0, dtype=np.int64)
-        return Angles(none, none, none, none, np.zeros(0))
+        return Angles.join([])
     rows, planes, angles = (np.concatenate([part[k] for part in parts]) for k in range(3))
     order = np.argsort(rows, kind="stable")
     sweeps = events.sweeps[rows[order]]

@@ -32,7 +32,7 @@ class ImuRanges:
 
 
 def parse_ranges(data: bytes) -> ImuRanges | None:
-    """The answer to feature report 01, or None: none yet (the first answer is zeros), or no sense."""
+    """The answer to feature report 01, or None: none yet (zeros), or it makes no sense."""
     if len(data) < 3 or data[0] != RANGES or not any(data[1:3]):
         return None
     if max(data[1:3]) > HIGHEST_CODE:

@@ -14,8 +14,9 @@ from the CRC, which is linear in them.
 
 import zlib
 from collections.abc import Iterable
+from dataclasses import dataclass
 
-__all__ = ["GEN1_PAYLOAD", "GEN2_PAYLOAD", "OotxReader"]
+__all__ = ["GEN1_PAYLOAD", "GEN2_PAYLOAD", "OotxReader", "StationBits"]
 
 GEN1_PAYLOAD, GEN2_PAYLOAD = 33, 43
 BEGIN = bytes(17) + b"\1"
@@ -24,6 +25,18 @@ LENGTH_BYTES, CRC_BYTES = 2, 4
 MISSING = 2
 MOST_MISSING = 14
 """Bits that may follow from the CRC: the 18 others of its 32 still tell whether it is right."""
+
+
+@dataclass(frozen=True, slots=True)
+class StationBits:
+    """Bits of a station, one a flash (Gen1) or turn (Gen2); None: it was missed.
+
+    ``fresh``: nobody knows how many were missed before them, so a reader begins anew.
+    """
+
+    station: int
+    bits: tuple[int | None, ...]
+    fresh: bool
 
 
 class OotxReader:

@@ -1,10 +1,15 @@
 """What a device measured, before anyone thinks about it: columns of counts and unwrapped ticks."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from lobstr_hw.drivers.lighthouse.angles import Ints
 
-__all__ = ["RawEvents"]
+__all__ = ["EventLists", "RawEvents"]
+
+Row = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,3 +33,33 @@ class RawEvents:
     def __len__(self) -> int:
         """Events of all kinds."""
         return len(self.imu) + len(self.pulses) + len(self.syncs) + len(self.sweeps)
+
+
+@dataclass(slots=True)
+class EventLists:
+    """Collects events one by one, as rows of RawEvents."""
+
+    imu: list[Row] = field(default_factory=list)
+    pulses: list[Row] = field(default_factory=list)
+    syncs: list[Row] = field(default_factory=list)
+    sweeps: list[Row] = field(default_factory=list)
+    syncs_before: list[int] = field(default_factory=list)
+
+    def add_sweep(self, row: Row) -> None:
+        """A sweep, after the syncs that are there."""
+        self.sweeps.append(row)
+        self.syncs_before.append(len(self.syncs))
+
+    def events(self) -> RawEvents:
+        """What was collected."""
+        return RawEvents(
+            imu=_table(self.imu, 7),
+            pulses=_table(self.pulses, 3),
+            syncs=_table(self.syncs, 4),
+            sweeps=_table(self.sweeps, 4),
+            syncs_before=np.array(self.syncs_before, dtype=np.int64),
+        )
+
+
+def _table(rows: Sequence[Row], columns: int) -> Ints:
+    return np.array(rows, dtype=np.int64).reshape(-1, columns)

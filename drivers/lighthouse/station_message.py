@@ -2,12 +2,12 @@
 
 Little-endian; e is a half float, two of them are of axis or plane 0 and 1.
 
-    Gen1 (33 bytes) and Gen2 (43) begin alike           then Gen1              then Gen2
-    0   u16 bits 15-6 firmware, 5-0 protocol            31 u8 mode A, B, C     31 u8 bits 6-0 channel
-    2   u32 id                                          32 u8 faults           32 u8 faults
-    6   2e  phase             16  2e    curve                                  33 2e ogeephase
-    10  2e  tilt              20  3 i8  up: 127 long                           37 2e ogeemag
-    14  u8  unlock count      23  2e    gibphase                               41 u16 changes at start
+    Gen1 (33 bytes) and Gen2 (43) begin alike         then Gen1            then Gen2
+    0   u16 bits 15-6 firmware, 5-0 protocol          31 u8 mode A, B, C   31 u8 bits 6-0 channel
+    2   u32 id                                        32 u8 faults         32 u8 faults
+    6   2e  phase             16  2e    curve                              33 2e ogeephase
+    10  2e  tilt              20  3 i8  up: 127 long                       37 2e ogeemag
+    14  u8  unlock count      23  2e    gibphase                           41 u16 of this start
     15  u8  hardware          27  2e    gibmag
 """
 
@@ -29,7 +29,7 @@ LARGEST = 4.0
 
 
 def parse_station(payload: bytes) -> StationCalibration | None:
-    """The calibration that a station sends, or None: it makes no sense or is of another protocol."""
+    """The calibration that a station sends, or None: no sense, or of another protocol."""
     if len(payload) not in (COMMON.size, COMMON.size + GEN2_TAIL.size):
         return None
     version, number, *numbers = COMMON.unpack_from(payload)
@@ -44,10 +44,17 @@ def parse_station(payload: bytes) -> StationCalibration | None:
         return None
     if not is_gen2:
         values[1] = np.tan(values[1])
+    phase, tilt, curve, gibphase, gibmag, ogeephase, ogeemag = values
     return StationCalibration(
-        2 if is_gen2 else 1,
-        number,
-        *values,
+        generation=2 if is_gen2 else 1,
+        id=number,
+        phase=phase,
+        tilt=tilt,
+        curve=curve,
+        gibphase=gibphase,
+        gibmag=gibmag,
+        ogeephase=ogeephase,
+        ogeemag=ogeemag,
         up=_unit(np.array(up, dtype=np.float64)),
         mode=mode & CHANNEL,
         unlock_count=unlocks,
