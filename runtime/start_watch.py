@@ -45,4 +45,7 @@ class StartWatch:
         self.done = check.standing or now_s >= self._end_s
         if self.done:
             self._samples.clear()
-        return [Spoken(f"Warning: {bad.advice}.", Sound.TROUBLE) for bad in check.failed[:1]]
+        return [
+            Spoken(f"Warning: {bad.advice.replace('_', ' ')}.", Sound.TROUBLE)
+            for bad in check.failed[:1]
+        ]

@@ -159,13 +159,12 @@ def _may_replace(path: Path) -> bool:
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
-def _person(args: argparse.Namespace) -> "Person":
+def _person(args: argparse.Namespace, unix_s: float | None) -> "Person":
+    """Nothing is known but the height, and when this is (not every log says)."""
     from lobstr_hw.runtime.wizard.stage import Person
 
-    return Person(
-        stature_m=None if args.height is None else args.height / 100.0,
-        created=datetime.now(UTC).isoformat(timespec="seconds"),
-    )
+    when = "" if unix_s is None else datetime.fromtimestamp(unix_s, UTC).isoformat("T", "seconds")
+    return Person(stature_m=None if args.height is None else args.height / 100.0, created=when)
 
 
 def _clearance_m(args: argparse.Namespace) -> float | None:
@@ -192,7 +191,7 @@ def _wizard_on_log(
         if damage:
             _tell(f"{args.sim}: {damage}; looking at the {driver.duration_s:.1f} s before.")
         steps = steps_for_a_log(floor_clearance_m=_clearance_m(args))
-        wizard = Wizard(_person(args), steps)
+        wizard = Wizard(_person(args, driver.log.unix_offset_s), steps)
         run_on_log(driver, wizard, stop)
     return wizard.person if wizard.done else None
 
@@ -209,10 +208,11 @@ def _wizard(
     from lobstr_hw.runtime.wizard.run import run_with_person
 
     steps = steps_for_a_person(floor_clearance_m=_clearance_m(args), confirm=not args.yes)
-    wizard = Wizard(_person(args), steps, countdown_s=args.countdown)
+    clock = HostClock()
+    wizard = Wizard(_person(args, clock.unix_s()), steps, countdown_s=args.countdown)
     front = PersonFront(speech=not args.no_speech, terminal=sys.stderr.isatty(), tell=_tell)
     with driver, front:
-        run_with_person(driver, wizard, front, HostClock(), stop, args.timeout)
+        run_with_person(driver, wizard, front, clock, stop, args.timeout)
         if wizard.done:
             front.say([spoken_result(wizard.person)])
             front.show(wizard.view())

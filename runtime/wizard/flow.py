@@ -139,7 +139,7 @@ class Wizard:
             if len(self._refusals) == MOST_TRIES:
                 self.refused = True
                 return []
-            advice = check.failed[0].advice
+            advice = check.failed[0].advice.replace("_", " ")
             said = [Spoken(f"That was not right: {advice}. Once more.", Sound.TROUBLE)]
             self.person.once_more()
             self._begin(self._restart_at)

@@ -57,6 +57,13 @@ def test_json_is_one_document_that_agrees_with_the_profile(
     assert document["verdict"] in ("good", "fair", "poor")
 
 
+def test_the_same_log_gives_the_same_profile_byte_for_byte(log: Path, tmp_path: Path) -> None:
+    paths = [tmp_path / name for name in ("a.json", "b.json")]
+    for path in paths:
+        assert main(["--sim", str(log), "--yes", "--profile", str(path)]) == 0
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
 def test_a_height_that_is_given_is_in_the_profile(log: Path, tmp_path: Path) -> None:
     path = tmp_path / "me.json"
     assert main(["--sim", str(log), "--yes", "--height", "181", "--profile", str(path)]) == 0

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from lobstr_hw.poses import PartialPose
 from lobstr_hw.runtime.announcer import Sound, Spoken
 from lobstr_hw.runtime.wizard.find_devices import CONFIRM_S, FindDevices
 from lobstr_hw.runtime.wizard.flow import AGAIN_S, Wizard
+from lobstr_hw.runtime.wizard.move_freely import MoveFreely, Part
 from lobstr_hw.runtime.wizard.plan import MakeStage
 from lobstr_hw.runtime.wizard.stage import Person
 from lobstr_hw.runtime.wizard.stand_still import StandStill
@@ -205,6 +207,46 @@ def test_exec_begins_the_t_pose_anew() -> None:
     t_pose = play.wizard.person.t_pose
     assert t_pose is not None
     assert t_pose.start_s >= 0.8
+
+
+SLIP = np.array([0.0, 0.04, 0.0])
+
+
+class Slipping(FakeDriver):
+    """The left hand's tracker slips by 4 cm while the T-pose is held."""
+
+    def poll(self, now_s: float) -> Sequence[TrackerSample]:
+        return [self._slipped(sample) for sample in super().poll(now_s)]
+
+    def _slipped(self, sample: TrackerSample) -> TrackerSample:
+        pose = sample.T_world_tracker
+        if sample.serial != SERIALS[TrackerRole.LEFT_HAND] or sample.time_s < 2.0:
+            return sample
+        assert pose.p is not None
+        return replace(sample, T_world_tracker=PartialPose(pose.R, pose.p + SLIP))
+
+
+def test_a_wrong_calibration_is_refused_with_the_reason_and_asked_for_again() -> None:
+    quick = partial(MoveFreely, parts=[Part("Move.", "Move.", 0.5)])
+    play = Play((StandStill, TakeTPose, quick), Slipping())
+    play.run(8.0)
+    while not any("Once more" in spoken.text for _, spoken in play.heard):
+        assert play.now_s < 40.0
+        play.run(play.now_s + 1.0)
+    (words,) = [spoken for _, spoken in play.heard if "That was not right" in spoken.text]
+    assert "left hand tracker moved" in words.text
+    assert words.sound is Sound.TROUBLE
+    assert play.wizard.person.t_pose is None, "nothing of it is kept"
+    with pytest.raises(CalibrationError, match=r"refused.*left_hand"):
+        raise play.wizard.failure()
+
+
+def test_what_the_movement_did_not_show_is_asked_for_once_more() -> None:
+    quick = partial(MoveFreely, parts=[Part("Move.", "Move.", 2.5)])
+    play = Play((TakeTPose, quick), FakeDriver()).run(30.0)
+    assert play.wizard.done
+    asked = [spoken.text for _, spoken in play.heard if spoken.text.startswith(("Nod", "Walk"))]
+    assert asked, "he sways and does nothing else"
 
 
 def test_nobody_is_nagged() -> None:
