@@ -4,8 +4,10 @@ A set is NAME.json (stations, device configuration) and NAME.npz (IMU, light, tr
 of libsurvive's simulator; its world has Z up.
 """
 
+import argparse
 import json
 import math
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,9 +21,19 @@ from lobstr_hw.drivers.lighthouse.angles import (
     Ints,
     StationCalibration,
 )
-from lobstr_hw.drivers.lighthouse.light import Station
+from lobstr_hw.drivers.lighthouse.light import Station, Stations, take_angles
+from lobstr_hw.drivers.lighthouse.station_solve import solve_stations
+from lobstr_hw.drivers.lighthouse.station_views import Take
+from lobstr_hw.drivers.lighthouse.tracker import (
+    Fix,
+    PoseBatch,
+    TrackerSettings,
+    begin,
+    join_poses,
+    step,
+)
 from lobstr_hw.poses import Pose
-from lobstr_hw.rotations import Array, from_quat_xyzw
+from lobstr_hw.rotations import Array, from_quat_xyzw, geodesic_angle
 
 PERIODS = 1000 * np.array(
     [959, 957, 953, 949, 947, 943, 941, 939, 937, 929, 919, 911, 907, 901, 893, 887]
@@ -48,7 +60,7 @@ class SimulatedSet:
 def y_up_from_z_up(p: Array, R: Array | None = None) -> tuple[Array, Array]:
     """Positions (..., 3) and rotations of a world with Z up, in ours: (x, z, -y)."""
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    return p @ turn.T, turn @ (np.eye(3) if R is None else R)
+    return np.asarray(p) @ turn.T, turn @ (np.eye(3) if R is None else R)
 
 
 def _rotation_wxyz(q: Array) -> Array:
@@ -134,3 +146,114 @@ def read_set(path: Path, held: bool = True) -> SimulatedSet:
         path.stem, numbered, _model(path.stem, said["device_config"]),
         ImuSamples(arrays["imu_tc"], imu[:, :3], imu[:, 3:]), angles, arrays["gt_tc"], p, R, v,
     )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """How far poses are from the truth: positions in mm, rotations in degrees.
+
+    Attributes:
+        mm, mm_95, degrees, degrees_95: median and 95th percentile.
+        tracked: share of the IMU's samples with a pose by light or within 100 ms of it.
+        scale: of the world, less one; 0 where stations were given.
+        gravity_degrees: between up and up.
+        cpu: seconds of one core for a second of data (tracking), and of the stations' solve.
+        solve_s: likewise, in all.
+        hits_per_s: of light, solved with one core kept busy.
+    """
+
+    mm: float
+    mm_95: float
+    degrees: float
+    degrees_95: float
+    tracked: float
+    scale: float
+    gravity_degrees: float
+    cpu: float
+    solve_s: float
+    hits_per_s: float
+
+
+PIECE = 11 * TICKS_PER_S // 1000
+"""Data come in pieces of 11 ms, as a loop at 90 Hz would fetch them."""
+
+
+def follow(data: SimulatedSet, stations: Stations) -> tuple[PoseBatch, float]:
+    """All poses, and the seconds it took."""
+    begun = time.process_time()
+    state, given, settings = begin(), [], TrackerSettings()
+    for since in range(int(data.imu.ticks[0]), int(data.imu.ticks[-1]) + PIECE, PIECE):
+        i, j = np.searchsorted(data.imu.ticks, [since, since + PIECE])
+        k, n = np.searchsorted(data.angles.ticks, [since, since + PIECE])
+        imu = ImuSamples(data.imu.ticks[i:j], data.imu.acc_g[i:j], data.imu.gyro_rad_s[i:j])
+        light = take_angles(data.angles, slice(int(k), int(n)))
+        state, batch = step(state, data.model, stations, imu, light, settings)
+        given.append(batch)
+    return join_poses(given), time.process_time() - begun
+
+
+def score(data: SimulatedSet, solve: bool) -> Score:
+    """Track a set with its true stations, or with stations solved from the set itself."""
+    begun, stations = time.process_time(), data.stations
+    if solve:
+        calibrations = {n: s.calibration for n, s in data.stations.items()}
+        stations = solve_stations([Take(data.model, data.imu, data.angles)], calibrations).stations
+    solve_s = time.process_time() - begun
+    poses, seconds = follow(data, stations)
+    i = np.searchsorted(data.truth_ticks, poses.ticks)
+    tracked = (i < len(data.truth_ticks)) & (poses.fix != Fix.LOST)
+    p, R = poses.p[tracked], poses.R[tracked]
+    true_p, true_R = data.truth_p[i[tracked]], data.truth_R[i[tracked]]
+    turn, move, scale = aligned(p, true_p) if solve else (np.eye(3), np.zeros(3), 1.0)
+    mm = 1e3 * np.linalg.norm(p @ turn.T + move - true_p, axis=1)
+    degrees = np.degrees(geodesic_angle(turn @ R, true_R))
+    duration = float(data.imu.ticks[-1] - data.imu.ticks[0]) / TICKS_PER_S
+    return Score(
+        float(np.median(mm)), float(np.percentile(mm, 95)),
+        float(np.median(degrees)), float(np.percentile(degrees, 95)),
+        float(np.count_nonzero(tracked) / len(data.imu)), scale - 1.0,
+        float(np.degrees(np.arccos(min(turn[1, 1], 1.0)))),
+        seconds / duration, solve_s, len(data.angles) / seconds,
+    )  # fmt: skip
+
+
+def aligned(p: Array, true_p: Array) -> tuple[Array, Array, float]:
+    """The rigid motion that takes points (n, 3) best to the true ones, and the scale left over."""
+    a, b = p - p.mean(axis=0), true_p - true_p.mean(axis=0)
+    U, S, Vt = np.linalg.svd(b.T @ a)
+    sign = np.array([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
+    turn = U @ (sign[:, None] * Vt)
+    return turn, true_p.mean(axis=0) - turn @ p.mean(axis=0), float(S @ sign / np.sum(a**2))
+
+
+HEAD = """\
+| set | stations | mm | mm 95 % | degrees | degrees 95 % | tracked % | scale % | gravity degrees \
+| core % | hits/s a core |
+|---|---|---|---|---|---|---|---|---|---|---|"""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog="example: python tools/lighthouse_sim.py data/lighthouse/sim"
+    )
+    parser.add_argument("folder", type=Path, help="with NAME.json and NAME.npz")
+    paths = sorted(parser.parse_args().folder.glob("*.json"))
+    if not paths:
+        parser.error("no NAME.json in this folder")
+    print(HEAD)
+    for path in paths:
+        data = read_set(path)
+        for solve in (False, True):
+            s = score(data, solve)
+            how = f"solved in {s.solve_s:.1f} s" if solve else "given"
+            world = f"{100 * s.scale:+.3f} | {s.gravity_degrees:.3f}" if solve else "- | -"
+            print(
+                f"| {data.name} | {how} | {s.mm:.3f} | {s.mm_95:.3f} | {s.degrees:.3f} |"
+                f" {s.degrees_95:.3f} | {100 * s.tracked:.1f} | {world} | {100 * s.cpu:.0f} |"
+                f" {s.hits_per_s:.0f} |",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()

@@ -187,7 +187,7 @@ def correct_with_light(
     """
     error, H, seen = _light_residuals(state, track, angles, model, stations)
     P9 = state.P[:9, :9]
-    spread = np.einsum("mi,ij,mj->m", H, P9, H, optimize=True) + settings.hit_sigma_rad**2
+    spread = np.sum((H @ P9) * H, axis=1) + settings.hit_sigma_rad**2
     good = seen & (error**2 < settings.gate_sigmas**2 * spread)
     used = int(np.count_nonzero(good))
     if used == 0:

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 from lobstr_hw.drivers.lighthouse.light import Hits, Stations, planes
-from lobstr_hw.drivers.lighthouse.refine import Guess, Refined, refine
+from lobstr_hw.drivers.lighthouse.refine import Guess, Refined, refine, residuals
 from lobstr_hw.rotations import Array, from_axis_angle, from_rotation_vector, rotation_between
 
 __all__ = ["seed", "seed_with_rotation"]
@@ -21,6 +21,12 @@ REFINED = 8
 CLEARLY_RIGHT_RAD = 1.5e-4
 """A fit as good as the hits themselves: no need to look at the others."""
 SEEN_AT_LEAST = 0.7
+OUTLIER, OUTLIER_RAD, TRUE_AT_LEAST = 6.0, 1e-3, 0.6
+"""Hits so many times further off than the middle one are reflections; most must be true."""
+SAME_RISE = 0.1
+"""Hands speed up by some metres per second squared: 0.3 g beside gravity tilt "up" 16 degrees."""
+FEW = 60
+"""Hits that are looked at until the choice is made; they come interleaved by sensor and station."""
 MINIMUM_HITS = 8
 MINIMUM_SENSORS = 4
 
@@ -36,13 +42,17 @@ def _rotations() -> Array:
     return np.asarray((tip[:, None] @ spin[None]).reshape(-1, 3, 3))
 
 
-def seed(stations: Stations, hits: Hits, evaluations: int = 40) -> Refined | None:
+def seed(
+    stations: Stations, hits: Hits, up: Array | None = None, evaluations: int = 40
+) -> Refined | None:
     """The pose from hits of about two turns of the rotors, nothing else known.
 
     Args:
         stations: where they stand.
         hits: at their moment; a moving device too (the gyroscope has turned them, the velocity is
             fitted).
+        up: (3,) by the accelerometer, in the IMU frame, if the stations' world has Y up. It tells
+            a flat set of sensors from its mirror image, which fits nearly as well from afar.
         evaluations: for the last refinement.
 
     Returns:
@@ -51,11 +61,29 @@ def seed(stations: Stations, hits: Hits, evaluations: int = 40) -> Refined | Non
     if len(hits) < MINIMUM_HITS or len(np.unique(hits.sensor)) < MINIMUM_SENSORS:
         return None
     fits: list[Refined] = []
-    for guess in _ranked(stations, hits, _rotations()):
-        fits.append(refine(stations, hits, guess, 8))
-        if fits[-1].rms_rad < CLEARLY_RIGHT_RAD and fits[-1].seen > 0.95:
+    plain = not _is_flat(hits.points)
+    few = hits.select(np.arange(len(hits)) % (1 + len(hits) // FEW) == 0)
+    for guess in _ranked(stations, few, _rotations()):
+        fits.append(refine(stations, few, guess, 8))
+        if plain and fits[-1].rms_rad < CLEARLY_RIGHT_RAD and fits[-1].seen > 0.95:
             break
-    return _best(stations, hits, fits, evaluations)
+    return _best(stations, hits, _upright(fits, up), evaluations)
+
+
+def _is_flat(points: Array) -> bool:
+    size = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(size[2] < 0.2 * size[0])
+
+
+def _upright(fits: list[Refined], up: Array | None) -> list[Refined]:
+    """Of fits that are about equally good, those that stand up as the accelerometer says."""
+    possible = [f for f in fits if f.seen >= SEEN_AT_LEAST]
+    if up is None or len(possible) < 2:
+        return possible
+    limit = max(3.0 * min(f.rms_rad for f in possible), OUTLIER_RAD)
+    good = [f for f in possible if f.rms_rad <= limit]
+    rise = [float((f.guess.R @ up)[1]) for f in good]
+    return [f for f, r in zip(good, rise, strict=True) if r > max(rise) - SAME_RISE]
 
 
 def seed_with_rotation(stations: Stations, hits: Hits, R: Array) -> Refined | None:
@@ -73,6 +101,12 @@ def _best(stations: Stations, hits: Hits, fits: list[Refined], evaluations: int)
         return None
     best = min(possible, key=lambda f: f.cost)
     best = refine(stations, hits, best.guess, evaluations)
+    error = np.abs(residuals(stations, hits, best.guess)[0])
+    true = error < max(OUTLIER * float(np.median(error)), OUTLIER_RAD)
+    if np.mean(true) < TRUE_AT_LEAST or np.count_nonzero(true) < MINIMUM_HITS // 2:
+        return None
+    if not np.all(true):
+        best = refine(stations, hits.select(true), best.guess, evaluations)
     return best if best.seen >= SEEN_AT_LEAST else None
 
 
@@ -80,10 +114,7 @@ def _ranked(stations: Stations, hits: Hits, R: Array) -> list[Guess]:
     """For each rotation (j, 3, 3) the position that fits; the best of them first."""
     normal, offset = planes(stations, hits)  # (m, 3), (m,)
     lever = np.einsum("mi,jik,mk->jm", normal, R, hits.points, optimize=True)
-    pull = (offset - lever) @ normal  # (j, 3)
-    # a trace of damping: with one axis only, the far direction is free
-    square = normal.T @ normal + 1e-9 * np.eye(3)
-    p = pull @ np.linalg.inv(square)
+    p = _positions(normal, offset - lever)
     centres = np.stack([stations[int(n)].T_world_station.p for n in hits.station])
     ahead = np.stack([-stations[int(n)].T_world_station.R[:, 2] for n in hits.station])
     away = p[:, None] - centres  # (j, m, 3)
@@ -92,6 +123,21 @@ def _ranked(stations: Stations, hits: Hits, R: Array) -> list[Guess]:
     facing = np.einsum("jik,mk,jmi->jm", R, hits.normals, away, optimize=True) < 0.3 * distance
     front = np.einsum("jmi,mi->jm", away, ahead) > 0.0
     share = np.mean(facing & front, axis=1)
-    cost = np.mean(error**2, axis=1) / np.maximum(share, 0.05) ** 4
+    # a quantile, not a mean: some hits are reflections
+    cost = np.quantile(np.abs(error), 0.7, axis=1) / np.maximum(share, 0.05) ** 2
     order = np.argsort(cost, kind="stable")[:REFINED]
     return [Guess(R[j], p[j], np.zeros(3)) for j in order]
+
+
+def _positions(normal: Array, right: Array) -> Array:
+    """Positions (j, 3) that lie best on planes ``normal @ x = right`` (j, m), twice reweighed."""
+    weight = np.ones(right.shape)
+    for _ in range(3):
+        # a trace of damping: with one axis only, the far direction is free
+        square = np.einsum("jm,mi,mk->jik", weight, normal, normal, optimize=True)
+        pull = (weight * right) @ normal
+        p = np.linalg.solve(square + 1e-9 * np.eye(3), pull[..., None])[..., 0]
+        off = np.abs(p @ normal.T - right)
+        scale = np.maximum(3.0 * np.median(off, axis=1, keepdims=True), 1e-6)
+        weight = 1.0 / (1.0 + (off / scale) ** 4)
+    return np.asarray(p)

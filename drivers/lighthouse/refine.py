@@ -8,7 +8,16 @@ from scipy.optimize import least_squares
 from lobstr_hw.drivers.lighthouse.light import Flags, Hits, Stations, look
 from lobstr_hw.rotations import Array, from_rotation_vector
 
-__all__ = ["Guess", "Refined", "cross_matrix", "move", "refine", "right_jacobian", "rms_rad"]
+__all__ = [
+    "Guess",
+    "Refined",
+    "cross_matrix",
+    "move",
+    "refine",
+    "residuals",
+    "right_jacobian",
+    "rms_rad",
+]
 
 HIT_SIGMA_RAD = 3e-4
 """What real stations and sensors are good for; the stations' model is no better than 1e-4."""

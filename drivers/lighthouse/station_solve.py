@@ -76,6 +76,7 @@ def solve_stations(
             f"base stations were seen well at {len(views)} moments, {VIEWS_AT_LEAST} are needed:"
             " carry a tracker slowly through the room, in sight of all stations."
         )
+    seen = [n for v in views for n in v.T_station_imu]
     rough = first_map(views, calibrations)
     views, guesses = _fitting(views, rough)
     stations, guesses, residual = bundle(
@@ -88,7 +89,6 @@ def solve_stations(
         hits = [_hits(takes, v, level @ g.R) for v, g in zip(views, guesses, strict=True)]
         stations, guesses, residual = bundle(stations, hits, guesses, evaluations, upright.v)
         upright = measure_up(takes, views, guesses, stations)
-    seen = [n for v in views for n in v.T_station_imu]
     return StationSolution(
         _placed(stations, guesses, upright.up),
         residual,

@@ -8,6 +8,7 @@ light and IMU come by different ways). So poses do not depend on when a packet a
     IMU sample at t    its pose: the state at E, dead reckoned to t, for E + 10 ms < t <= E + 18 ms
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
@@ -27,10 +28,10 @@ from lobstr_hw.drivers.lighthouse.kalman import (
 )
 from lobstr_hw.drivers.lighthouse.light import Hits, Stations, join_angles, take_angles
 from lobstr_hw.drivers.lighthouse.pose_seed import seed, seed_with_rotation
-from lobstr_hw.drivers.lighthouse.refine import Refined, rms_rad
+from lobstr_hw.drivers.lighthouse.refine import Refined, refine, residuals
 from lobstr_hw.rotations import Array
 
-__all__ = ["Fix", "PoseBatch", "TrackerSettings", "TrackerState", "begin", "step"]
+__all__ = ["Fix", "PoseBatch", "TrackerSettings", "TrackerState", "begin", "join_poses", "step"]
 
 
 class Fix(IntEnum):
@@ -54,8 +55,11 @@ class TrackerSettings:
         inertial_s: without light for so long: dead reckoning, said so.
         lost_s: without light for so long: lost. Dead reckoning drifts 5 cm in 0.3 s.
         seed_s: hits of the last so many seconds make a new pose: two turns of the rotors.
+        seed_span_s: they must cover so much: velocity is told by time.
         seed_rms_rad: a new pose must fit so well.
+        seed_outlier_rad: hits further from a new pose than this are reflections.
         seed_sigma_m: and be known so well.
+        search_windows: a pose from nothing, some 40 ms of work, is looked for so seldom.
         rotation_known_s: after so long without light the gyroscope's rotation is forgotten.
         lost_sigma_m: a position less certain than this is none.
         disagree_windows: so many windows in a row whose light does not fit: the pose is wrong.
@@ -70,8 +74,11 @@ class TrackerSettings:
     inertial_s: float = 0.05
     lost_s: float = 0.1
     seed_s: float = 0.036
+    seed_span_s: float = 0.02
     seed_rms_rad: float = 1e-3
+    seed_outlier_rad: float = 3e-3
     seed_sigma_m: float = 0.03
+    search_windows: int = 16
     rotation_known_s: float = 5.0
     lost_sigma_m: float = 0.1
     disagree_windows: int = 8
@@ -176,14 +183,14 @@ def step(
     state = _take_in(state, stations, imu, angles, settings)
     given: list[PoseBatch] = []
     if not len(state.imu):
-        return state, _join(given)
+        return state, join_poses(given)
     newest = int(state.imu.ticks[-1])
     while newest >= state.window_end + settings.window + settings.lag:
         state, batch = _give(state, state.window_end + settings.window + settings.lag, settings)
         given.append(batch)
         state = _window(state, model, stations, settings)
     state, batch = _give(state, newest, settings)
-    return state, _join([*given, batch])
+    return state, join_poses([*given, batch])
 
 
 def _take_in(
@@ -246,10 +253,10 @@ def _give(
     """The poses of samples not given yet, up to a moment."""
     f = state.filter
     if f is None:
-        return replace(state, given=max(state.given, until)), _join([])
+        return replace(state, given=max(state.given, until)), join_poses([])
     nodes, skip = _nodes(state.imu, f.ticks, until, max(state.given, f.ticks))
     if skip >= len(nodes):
-        return state, _join([])
+        return state, join_poses([])
     track = _reckon(state, f, nodes)
     k = len(nodes) - skip
     p, v, fix = track.p[skip:], track.v[skip:], np.full(k, Fix.LIGHT, dtype=np.int8)
@@ -344,7 +351,9 @@ def _find(
     since = end - int(settings.seed_s * TICKS_PER_S)
     i, j = np.searchsorted(state.angles.ticks, [since, end], side="right")
     angles = take_angles(state.angles, slice(int(i), int(j)))
-    if j - i < 8 or not len(state.imu) or state.imu.ticks[0] > since + settings.window:
+    if j - i < 8 or angles.ticks[-1] - angles.ticks[0] < settings.seed_span_s * TICKS_PER_S:
+        return state
+    if not len(state.imu) or state.imu.ticks[0] > since + settings.window:
         return state
     f = state.filter
     gyro_bias = np.zeros(3) if f is None else f.gyro_bias
@@ -352,6 +361,10 @@ def _find(
     fit = _fit(state, stations, hits, end, settings)
     if fit is None:
         return state
+    # again, now that it is known which way it fell meanwhile
+    hits = gather(model, angles, state.imu, end, gyro_bias, fit.guess.R)
+    true = np.abs(residuals(stations, hits, fit.guess)[0]) < settings.seed_outlier_rad
+    fit = refine(stations, hits.select(true), fit.guess, 10)
     acc_bias = np.zeros(3) if f is None else f.acc_bias
     fresh = start(end, fit, acc_bias, gyro_bias, settings.filter)
     if f is not None:
@@ -375,20 +388,19 @@ def _fit(
         fit = seed_with_rotation(stations, hits, f.R)
         if fit is not None and _is_good(stations, hits, fit, settings):
             return fit
-    # dear, hence not in every window; a device that is not seen enough would stall the others
-    if (end // settings.window) % 4:
+    # dear, hence not in every window: a device that is not seen enough would stall the others
+    if (end // settings.window) % settings.search_windows:
         return None
-    fit = seed(stations, hits)
+    up = state.imu.acc_g[-8:].mean(axis=0)
+    fit = seed(stations, hits, up / max(float(np.linalg.norm(up)), 1e-9))
     return fit if fit is not None and _is_good(stations, hits, fit, settings) else None
 
 
 def _is_good(stations: Stations, hits: Hits, fit: Refined, settings: TrackerSettings) -> bool:
+    error = np.abs(residuals(stations, hits, fit.guess)[0])
     sigma = float(np.sqrt(np.trace(fit.covariance[:3, :3])))
-    return (
-        sigma < settings.seed_sigma_m
-        and rms_rad(stations, hits, fit.guess) < 3.0 * settings.seed_rms_rad
-        and fit.rms_rad < settings.seed_rms_rad
-    )
+    fits = float(np.mean(error < settings.seed_outlier_rad)) > 0.6
+    return sigma < settings.seed_sigma_m and fit.rms_rad < settings.seed_rms_rad and fits
 
 
 def _is_still(state: TrackerState, end: int, settings: TrackerSettings) -> bool:
@@ -425,7 +437,8 @@ def _forget(state: TrackerState, end: int, settings: TrackerSettings) -> Tracker
     return replace(state, imu=imu, angles=take_angles(state.angles, slice(j, None)))
 
 
-def _join(batches: list[PoseBatch]) -> PoseBatch:
+def join_poses(batches: Sequence[PoseBatch]) -> PoseBatch:
+    """Poses one after the other."""
     full = [b for b in batches if len(b)]
     if not full:
         return PoseBatch(
