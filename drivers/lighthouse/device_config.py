@@ -33,6 +33,8 @@ LONGEST_JSON = 1 << 20
 MOST_SENSORS = 64
 LARGEST_M = 2.0
 """No sensor is further from its device's origin."""
+LARGEST = 1_000.0
+"""No bias, scale or length is as large."""
 STANDARD_GRAVITY = 9.80665
 Json = dict[str, Any]
 
@@ -91,9 +93,9 @@ def _device(config: Json) -> DeviceModel:
     if len(points) != len(normals):
         raise ValueError(f"{len(points)} modelPoints and {len(normals)} modelNormals")
     return DeviceModel(
-        serial=str(config["device_serial_number"]),
-        device_class=str(config.get("device_class", "")),
-        model=str(config.get("model_number", config.get("model_name", ""))),
+        serial=_text(config["device_serial_number"]),
+        device_class=_text(config.get("device_class", "")),
+        model=_text(config.get("model_number", config.get("model_name", ""))),
         points=T_imu_trackref.apply(points),
         normals=(T_imu_trackref.R @ normals[..., None])[..., 0],
         ports=_ports(light.get("channelMap"), len(points)),
@@ -157,9 +159,15 @@ def _ports(values: object, sensors: int) -> np.ndarray[tuple[int, ...], np.dtype
     return ports.astype(np.int64)
 
 
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"{value!r} should be a text")
+    return value
+
+
 def _numbers(values: object, count: int) -> Array:
     numbers = np.array(values, dtype=np.float64)
-    if numbers.shape != (count,) or not np.isfinite(numbers).all():
+    if numbers.shape != (count,) or not (np.abs(numbers) < LARGEST).all():
         raise ValueError(f"expected {count} numbers, got {values}")
     return numbers
 

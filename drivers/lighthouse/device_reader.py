@@ -94,7 +94,8 @@ class DeviceReader:
         """The samples that are newer than the last one: sequence numbers go round at 256."""
         newest = self._sequence
         last = slots[0][0] - HALF_ROUND if newest is None else newest
-        for age, slot in sorted(((slot[0] - last) & 0xFF, slot) for slot in slots):
+        by_age = {(slot[0] - last) & 0xFF: slot for slot in slots}
+        for age, slot in sorted(by_age.items()):
             if newest is None or 0 < age < HALF_ROUND:
                 self._sequence = slot[0]
                 self._lists.imu.append((self._ticks.imu(slot[1]), *slot[2]))
