@@ -1,7 +1,7 @@
 """A made-up room: base stations, a device that moves as told, and what it measures of them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -50,10 +50,11 @@ def carried(seed: int, speed: float = 1.0) -> Motion:
     phase, pitch = random.uniform(0, 6.28, (2, 3)), random.uniform(0.7, 1.3, (2, 3)) * speed
 
     def place(t: Array) -> Array:
-        return np.array([0.5, 0.3, 0.5]) * np.sin(np.outer(t, pitch[0]) + phase[0]) + [0, 1.0, 0]
+        wave = np.sin(np.outer(t, pitch[0]) + phase[0])
+        return np.asarray(np.array([0.5, 0.3, 0.5]) * wave + np.array([0.0, 1.0, 0.0]))
 
     def turn(t: Array) -> Array:
-        return np.array([0.9, 0.8, 0.7]) * np.sin(np.outer(t, pitch[1]) + phase[1])
+        return np.asarray(np.array([0.9, 0.8, 0.7]) * np.sin(np.outer(t, pitch[1]) + phase[1]))
 
     return Motion(place, turn)
 
@@ -91,13 +92,15 @@ def room(generation: int, seed: int = 0, count: int = 2) -> dict[int, Station]:
     for number in range(count):
         p = rotation_y(np.pi / 4 + number * np.pi * (0.5 if count > 2 else 1.0)) @ [0.0, 2.1, -2.5]
         R = rotation_between(np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]) - p)
-        terms = {
-            name: random.uniform(-size, size, 2)
-            for name, size in {
-                "phase": 0.05, "tilt": 0.002, "curve": 0.003, "gibphase": 3.0, "gibmag": 0.008,
-            }.items()
-        }  # fmt: skip
-        calibration = replace(StationCalibration(generation, 1000 + number), **terms)
+        calibration = StationCalibration(
+            generation,
+            1000 + number,
+            phase=random.uniform(-0.05, 0.05, 2),
+            tilt=random.uniform(-0.002, 0.002, 2),
+            curve=random.uniform(-0.003, 0.003, 2),
+            gibphase=random.uniform(-3.0, 3.0, 2),
+            gibmag=random.uniform(-0.008, 0.008, 2),
+        )
         stations[number] = Station(calibration, Pose(R, p))
     return stations
 
