@@ -71,6 +71,8 @@ def in_terminal(
         environment: variables on top of this program's.
         stdout: a file that takes it instead of the terminal.
     """
+    if sys.platform == "win32":
+        raise NotImplementedError("Windows has no pseudo-terminals")
     import fcntl
     import pty
     import struct
