@@ -198,8 +198,8 @@ Why some differ, and what only we have:
 - IMU, within: a report holds the newest three samples in any order; the reference goes through them
   as they stand and drops one that stands after a newer one. Done its way, our parser gives exactly
   its samples, none more, none less.
-- Before: the reference waits for a device's configuration and, in Gen1, longer until it is sure of
-  the stations' rhythm; after, captures end in a broken stream, of which we read a little more.
+- Outside, all of them before: the reference waits for a device's configuration and, in Gen1, longer
+  until it is sure of the stations' rhythm.
 - The first light: until its first IMU sample the reference lacks the upper 8 of 32 bits of light
   times and goes on without, or with those of before; we leave such light out by 24 bits, and have
   the right bits soonest.

@@ -4,6 +4,7 @@ import math
 import struct
 import zlib
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -52,10 +53,11 @@ def gen1_pulses(
         flashes = {1: start, 0: start + 20_000}
         for station in seen:
             data = int(rng.integers(2))
+            late = [int(rng.integers(90)) for _ in range(angles.shape[2])]
             length = 2_750 + 500 * axis + 1_000 * data + 2_000 * (station != sweeping)
             pulses += [
-                (sensor, flashes[station] + late, length - late + int(rng.integers(-60, 60)))
-                for sensor, late in enumerate(rng.integers(0, 90, angles.shape[2]))
+                (sensor, flashes[station] + by, length - by + int(rng.integers(-60, 60)))
+                for sensor, by in enumerate(late)
             ]
             own = min(p[1] for p in pulses[-angles.shape[2] :])
             if station != sweeping:
@@ -70,7 +72,7 @@ def gen1_pulses(
 
 def cut(count: int, places: list[int]) -> Iterator[slice]:
     edges = sorted({0, count, *(place % (count + 1) for place in places)})
-    yield from (slice(a, b) for a, b in zip(edges, edges[1:], strict=False))
+    yield from (slice(a, b) for a, b in pairwise(edges))
 
 
 GEN1_ANGLES = np.random.default_rng(5).uniform(-0.9, 0.9, (2, 2, 6))
@@ -118,14 +120,9 @@ def _bits(told: list[StationBits]) -> dict[int, list[tuple[int | None, ...]]]:
 
 def test_gen1_reflections_and_noise_are_not_taken_for_stations() -> None:
     rng = np.random.default_rng(2)
-    noise = np.stack(
-        [
-            rng.integers(0, 24, 5_000),
-            np.sort(rng.integers(0, 10**9, 5_000)),
-            rng.integers(50, 7_000, 5_000),
-        ],
-        axis=1,
-    )
+    starts = np.sort(rng.integers(0, 10**9, 5_000))
+    ports, lengths = rng.integers(0, 24, 5_000), rng.integers(50, 7_000, 5_000)
+    noise = np.stack([ports, starts, lengths], axis=1)
     angles, told = Gen1Decoder().decode(noise)
     assert len(angles) == 0
     assert not any(bits.bits for bits in told)
@@ -342,3 +339,34 @@ def test_in_the_horizontal_plane_ideal_angles_are_the_bearing(bearing: float) ->
     gen1, gen2 = (reproject(StationCalibration(g), point) for g in (1, 2))
     np.testing.assert_allclose(gen1[0], -bearing, atol=1e-12)
     np.testing.assert_allclose(gen2, -bearing, atol=1e-12)
+
+
+WHEN = st.one_of(st.integers(0, 2**26), st.integers(0, 2**50))
+PULSES = st.lists(st.tuples(st.integers(0, 255), WHEN, st.integers(0, 65_535)), max_size=80)
+SYNCS = st.lists(st.tuples(st.integers(0, 15), WHEN, *[st.integers(0, 1)] * 2), max_size=40)
+SWEEPS = st.lists(
+    st.tuples(st.integers(0, 15), st.integers(0, 31), WHEN, st.integers(0, 1)), max_size=40
+)
+
+
+@given(PULSES, SYNCS, SWEEPS, st.data())
+def test_any_events_give_angles_of_a_half_turn_or_nothing(
+    pulses: list[tuple[int, ...]],
+    syncs: list[tuple[int, ...]],
+    sweeps: list[tuple[int, ...]],
+    data: st.DataObject,
+) -> None:
+    places = st.lists(st.integers(0, len(syncs)), min_size=len(sweeps), max_size=len(sweeps))
+    events = RawEvents(
+        imu=np.zeros((0, 7), dtype=np.int64),
+        pulses=np.array(pulses, dtype=np.int64).reshape(-1, 3),
+        syncs=np.array(syncs, dtype=np.int64).reshape(-1, 4),
+        sweeps=np.array(sweeps, dtype=np.int64).reshape(-1, 4),
+        syncs_before=np.array(sorted(data.draw(places)), dtype=np.int64),
+    )
+    gen1, _ = Gen1Decoder().decode(events.pulses)
+    gen2, _ = Gen2Decoder().decode(events)
+    assert len(gen1) <= len(pulses)
+    assert len(gen2) <= len(sweeps)
+    assert (np.abs(gen1.angle_rad) < math.pi / 2).all()
+    assert (np.abs(gen2.angle_rad) <= 4 * math.pi / 3).all()
