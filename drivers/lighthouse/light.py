@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Angles, Ints, StationCalibration
+from lobstr_hw.drivers.lighthouse.angles import Angles, Ints, StationCalibration
 from lobstr_hw.drivers.lighthouse.reprojection import PLANE_TILT, reproject
 from lobstr_hw.poses import Pose
 from lobstr_hw.rotations import Array
@@ -89,19 +89,15 @@ def take_angles(angles: Angles, which: Flags | slice) -> Angles:
 
 def join_angles(parts: Sequence[Angles]) -> Angles:
     """Angles one after the other, by time."""
-    order = np.argsort(np.concatenate([a.ticks for a in parts]), kind="stable")
+    joined = Angles.join(list(parts))
+    order = np.argsort(joined.ticks, kind="stable")
     return Angles(
-        np.concatenate([a.ticks for a in parts])[order],
-        np.concatenate([a.station for a in parts])[order],
-        np.concatenate([a.axis for a in parts])[order],
-        np.concatenate([a.sensor for a in parts])[order],
-        np.concatenate([a.angle_rad for a in parts])[order],
+        joined.ticks[order],
+        joined.station[order],
+        joined.axis[order],
+        joined.sensor[order],
+        joined.angle_rad[order],
     )
-
-
-def seconds(ticks: Ints | int, since: int) -> Array:
-    """Ticks as seconds since a tick; exact before it is a float."""
-    return np.asarray((np.asarray(ticks) - since) / TICKS_PER_S)
 
 
 def look(
