@@ -40,7 +40,9 @@ def test_a_person_is_led_through_it(tmp_path: Path) -> None:
     with in_terminal(arguments(path, "--json"), stdout=out) as terminal:
         assert terminal.finish(40.0) == 0, terminal.text
     shows_in_order(terminal, "1/", "Devices", "FAKE-PELVIS", "Stand still", "T-pose", "heading")
-    shows_in_order(terminal, "Got it", "Movement", "Nod", "Bow", "Turn", "Calibration is good")
+    # the heading is redrawn as often as the machine manages, the words come once
+    assert "Movement" in terminal.text
+    shows_in_order(terminal, "Got it", "Nod", "Bow", "Turn", "Calibration is good")
     assert BELL in terminal.text
     document = json.loads(out.read_text(encoding="utf-8"))
     assert document["profile"] == str(path)
