@@ -233,11 +233,14 @@ def correct_with_rest(
 
 def inject(state: FilterState, x: Array, P: Array) -> FilterState:
     """Move the nominal state by an error (15,), which is then none (Sola 2017, section 6.2)."""
+    R = state.R @ rotation_steps(x[None, ROTATION])[0]
+    # one Newton step keeps it a rotation through hours of products
+    R = R @ (1.5 * np.eye(3) - 0.5 * (R.T @ R))
     return FilterState(
         state.ticks,
         state.p + x[POSITION],
         state.v + x[VELOCITY],
-        state.R @ rotation_steps(x[None, ROTATION])[0],
+        R,
         state.gyro_bias + x[GYRO_BIAS],
         state.acc_bias + x[ACC_BIAS],
         0.5 * (P + P.T),

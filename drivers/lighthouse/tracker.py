@@ -8,155 +8,33 @@ light and IMU come by different ways). So poses do not depend on when a packet a
     IMU sample at t    its pose: the state at E, dead reckoned to t, for E + 10 ms < t <= E + 18 ms
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from enum import IntEnum
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Angles, DeviceModel, ImuSamples, Ints
-from lobstr_hw.drivers.lighthouse.inertial import Track, gather, integrate
+from lobstr_hw.drivers.lighthouse.inertial import Track, integrate
 from lobstr_hw.drivers.lighthouse.kalman import (
-    FilterSettings,
     FilterState,
     advance,
     correct_with_light,
     correct_with_rest,
     covariances,
-    start,
 )
-from lobstr_hw.drivers.lighthouse.light import Hits, Stations, join_angles, take_angles
-from lobstr_hw.drivers.lighthouse.pose_seed import seed, seed_with_rotation
-from lobstr_hw.drivers.lighthouse.refine import Refined, refine, residuals
-from lobstr_hw.rotations import Array
+from lobstr_hw.drivers.lighthouse.light import Stations, join_angles, take_angles
+from lobstr_hw.drivers.lighthouse.reacquire import reacquire
+from lobstr_hw.drivers.lighthouse.rest import is_still, rest_gyro
+from lobstr_hw.drivers.lighthouse.tracker_state import (
+    Fix,
+    PoseBatch,
+    TrackerSettings,
+    TrackerState,
+    begin,
+    join_poses,
+)
 
 __all__ = ["Fix", "PoseBatch", "TrackerSettings", "TrackerState", "begin", "join_poses", "step"]
-
-
-class Fix(IntEnum):
-    """How a pose came about."""
-
-    LIGHT = 0
-    """By light within the last 50 ms, and the IMU."""
-    INERTIAL = 1
-    """By the IMU alone, for up to 100 ms."""
-    LOST = 2
-    """Only the rotation is still followed; the position is where it was."""
-
-
-@dataclass(frozen=True, slots=True)
-class TrackerSettings:
-    """Times and limits of tracking.
-
-    Attributes:
-        window: ticks of light that are used together: about one sweep.
-        lag: ticks that light may come later than the IMU.
-        inertial_s: without light for so long: dead reckoning, said so.
-        lost_s: without light for so long: lost. Dead reckoning drifts 5 cm in 0.3 s.
-        seed_s: hits of the last so many seconds make a new pose: two turns of the rotors.
-        seed_span_s: they must cover so much: velocity is told by time.
-        seed_rms_rad: a new pose must fit so well.
-        seed_outlier_rad: hits further from a new pose than this are reflections.
-        seed_sigma_m: and be known so well.
-        search_windows: a pose from nothing, some 40 ms of work, is looked for so seldom.
-        rotation_known_s: after so long without light the gyroscope's rotation is forgotten.
-        lost_sigma_m: a position less certain than this is none.
-        disagree_windows: so many windows in a row whose light does not fit: the pose is wrong.
-        rest_s: so long without movement is rest.
-        rest_gyro_rad_s, rest_acc_g: spread of the IMU's samples at rest, at most.
-        rest_speed_m_s: a device that light sees moving is not at rest, however calm its IMU.
-        filter: of the Kalman filter.
-    """
-
-    window: int = 8 * TICKS_PER_S // 1000
-    lag: int = 10 * TICKS_PER_S // 1000
-    inertial_s: float = 0.05
-    lost_s: float = 0.1
-    seed_s: float = 0.036
-    seed_span_s: float = 0.02
-    seed_rms_rad: float = 1e-3
-    seed_outlier_rad: float = 3e-3
-    seed_sigma_m: float = 0.03
-    search_windows: int = 16
-    rotation_known_s: float = 5.0
-    lost_sigma_m: float = 0.1
-    disagree_windows: int = 8
-    rest_s: float = 0.25
-    rest_gyro_rad_s: float = 0.012
-    rest_acc_g: float = 0.012
-    rest_speed_m_s: float = 0.03
-    filter: FilterSettings = field(default_factory=FilterSettings)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PoseBatch:
-    """Poses of the IMU frame in the world, one for each IMU sample (k of them).
-
-    Attributes:
-        ticks: (k,) device ticks.
-        p, v: (k, 3). The velocity is zero while the device lies still.
-        R: (k, 3, 3).
-        angular_velocity: (k, 3) in the IMU frame, bias taken off.
-        covariance: (k, 6, 6) of the position, in the world, and the rotation, in the IMU frame.
-        fix: (k,) of Fix.
-    """
-
-    ticks: Ints
-    p: Array
-    v: Array
-    R: Array
-    angular_velocity: Array
-    covariance: Array
-    fix: NDArray[np.int8]
-
-    def __len__(self) -> int:
-        """Number of poses."""
-        return len(self.ticks)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TrackerState:
-    """All that tracking one device remembers.
-
-    Attributes:
-        filter: at the end of the last window, or None before the first pose.
-        imu: samples still needed: the last rest_s, and all after the filter's moment.
-        angles: hits still needed, by time.
-        window_end: ticks; windows up to here are done.
-        given: ticks of the last pose given.
-        light: ticks of the last hit that was believed.
-        lost: the position is not followed.
-        still: at rest.
-        disagreed: windows in a row whose light did not fit.
-        rms_rad: of the hits believed last.
-    """
-
-    filter: FilterState | None
-    imu: ImuSamples
-    angles: Angles
-    window_end: int
-    given: int
-    light: int
-    lost: bool
-    still: bool
-    disagreed: int
-    rms_rad: float
-
-
-def _no_imu() -> ImuSamples:
-    return ImuSamples(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
-
-
-def _no_angles() -> Angles:
-    none = np.zeros(0, np.int64)
-    return Angles(none, none, none, none, np.zeros(0))
-
-
-def begin() -> TrackerState:
-    """Nothing known yet."""
-    never = -(2**62)
-    return TrackerState(None, _no_imu(), _no_angles(), never, never, never, True, False, 0, 0.0)
 
 
 def step(
@@ -180,54 +58,53 @@ def step(
     Returns:
         The new state, and a pose for every new IMU sample since the first pose was found.
     """
-    state = _take_in(state, stations, imu, angles, settings)
+    state = _take_light(state, stations, angles)
     given: list[PoseBatch] = []
-    if not len(state.imu):
-        return state, join_poses(given)
-    newest = int(state.imu.ticks[-1])
-    while newest >= state.window_end + settings.window + settings.lag:
-        state, batch = _give(state, state.window_end + settings.window + settings.lag, settings)
+    for part in _unbroken(state, imu, settings):
+        state = _take_imu(state, part, settings)
+        newest = int(state.imu.ticks[-1])
+        while newest >= (usable := state.window_end + settings.window + settings.lag):
+            state, batch = _give(state, usable, settings)
+            given.append(batch)
+            state = _window(state, model, stations, settings)
+        state, batch = _give(state, newest, settings)
         given.append(batch)
-        state = _window(state, model, stations, settings)
-    state, batch = _give(state, newest, settings)
-    return state, join_poses([*given, batch])
+    return state, join_poses(given)
 
 
-def _take_in(
-    state: TrackerState,
-    stations: Stations,
-    imu: ImuSamples,
-    angles: Angles,
-    settings: TrackerSettings,
-) -> TrackerState:
-    if len(angles):
-        known = np.isin(angles.station, np.array(sorted(stations), dtype=np.int64))
-        in_time = angles.ticks > state.window_end
-        state = replace(
-            state, angles=join_angles([state.angles, take_angles(angles, known & in_time)])
-        )
-    if not len(imu):
+def _take_light(state: TrackerState, stations: Stations, angles: Angles) -> TrackerState:
+    if not len(angles):
         return state
-    later = imu.ticks > (state.imu.ticks[-1] if len(state.imu) else -(2**62))
+    known = np.isin(angles.station, np.array(sorted(stations), dtype=np.int64))
+    timely = take_angles(angles, known & (angles.ticks > state.window_end))
+    return replace(state, angles=join_angles([state.angles, timely]))
+
+
+def _unbroken(
+    state: TrackerState, imu: ImuSamples, settings: TrackerSettings
+) -> Iterator[ImuSamples]:
+    """New samples in stretches without a gap."""
+    since = state.imu.ticks[-1] if len(state.imu) else -(2**62)
+    new = np.flatnonzero(imu.ticks > since)
+    gaps = np.flatnonzero(np.diff(imu.ticks[new]) > settings.lost_s * TICKS_PER_S)
+    for i in np.split(new, gaps + 1):
+        if len(i):
+            yield ImuSamples(imu.ticks[i], imu.acc_g[i], imu.gyro_rad_s[i])
+
+
+def _take_imu(state: TrackerState, imu: ImuSamples, settings: TrackerSettings) -> TrackerState:
+    old = state.imu
+    if len(old) and imu.ticks[0] - old.ticks[-1] > settings.lost_s * TICKS_PER_S:
+        # nobody knows what it did meanwhile: as if it had just been switched on
+        state = replace(begin(), given=state.given, angles=state.angles)
     joined = ImuSamples(
-        np.concatenate([state.imu.ticks, imu.ticks[later]]),
-        np.concatenate([state.imu.acc_g, imu.acc_g[later]]),
-        np.concatenate([state.imu.gyro_rad_s, imu.gyro_rad_s[later]]),
+        np.concatenate([state.imu.ticks, imu.ticks]),
+        np.concatenate([state.imu.acc_g, imu.acc_g]),
+        np.concatenate([state.imu.gyro_rad_s, imu.gyro_rad_s]),
     )
-    first, newest = int(joined.ticks[0]), int(joined.ticks[-1])
     # windows lie at multiples of their length, wherever a recording begins
-    begun = max(state.window_end, first // settings.window * settings.window)
-    if newest - begun > 2 * TICKS_PER_S and len(state.imu) and later.any():
-        begun = _after_gap(joined, begun, settings)
-    return replace(state, imu=joined, window_end=begun)
-
-
-def _after_gap(imu: ImuSamples, begun: int, settings: TrackerSettings) -> int:
-    """Where to go on when the IMU was silent for over a second; else where we are."""
-    gaps = np.flatnonzero(np.diff(imu.ticks) > TICKS_PER_S)
-    if not len(gaps):
-        return begun
-    return max(begun, int(imu.ticks[gaps[-1] + 1]) // settings.window * settings.window)
+    first = int(joined.ticks[0]) // settings.window * settings.window
+    return replace(state, imu=joined, window_end=max(state.window_end, first))
 
 
 def _nodes(imu: ImuSamples, begin_at: int, end: int, after: int) -> tuple[Ints, int]:
@@ -280,11 +157,11 @@ def _window(
 ) -> TrackerState:
     """Use the next window of light."""
     end = state.window_end + settings.window
-    state = replace(state, window_end=end, still=_is_still(state, end, settings))
+    state = replace(state, window_end=end, still=is_still(state, end, settings))
     if state.filter is not None:
         state = _filter_window(state, state.filter, end, model, stations, settings)
     if state.lost:
-        state = _find(state, end, model, stations, settings)
+        state = reacquire(state, end, model, stations, settings)
     return _forget(state, end, settings)
 
 
@@ -313,7 +190,7 @@ def _filter_window(
         if report.used >= 2 and fits:
             state = replace(state, light=int(window.ticks[-1]), rms_rad=report.rms_rad)
     if state.still:
-        now = correct_with_rest(now, _rest_gyro(state, end, settings), settings.filter)
+        now = correct_with_rest(now, rest_gyro(state, end, settings), settings.filter)
     return _judge(replace(state, filter=now), f, now, end, settings)
 
 
@@ -340,93 +217,6 @@ def _turn_only(f: FilterState, track: Track) -> FilterState:
     return replace(f, ticks=int(track.ticks[-1]), R=track.R[-1], v=np.zeros(3), P=P)
 
 
-def _find(
-    state: TrackerState,
-    end: int,
-    model: DeviceModel,
-    stations: Stations,
-    settings: TrackerSettings,
-) -> TrackerState:
-    """Look for the pose anew."""
-    since = end - int(settings.seed_s * TICKS_PER_S)
-    i, j = np.searchsorted(state.angles.ticks, [since, end], side="right")
-    angles = take_angles(state.angles, slice(int(i), int(j)))
-    if j - i < 8 or angles.ticks[-1] - angles.ticks[0] < settings.seed_span_s * TICKS_PER_S:
-        return state
-    if not len(state.imu) or state.imu.ticks[0] > since + settings.window:
-        return state
-    f = state.filter
-    gyro_bias = np.zeros(3) if f is None else f.gyro_bias
-    hits = gather(model, angles, state.imu, end, gyro_bias)
-    fit = _fit(state, stations, hits, end, settings)
-    if fit is None:
-        return state
-    # again, now that it is known which way it fell meanwhile
-    hits = gather(model, angles, state.imu, end, gyro_bias, fit.guess.R)
-    true = np.abs(residuals(stations, hits, fit.guess)[0]) < settings.seed_outlier_rad
-    fit = refine(stations, hits.select(true), fit.guess, 10)
-    acc_bias = np.zeros(3) if f is None else f.acc_bias
-    fresh = start(end, fit, acc_bias, gyro_bias, settings.filter)
-    if f is not None:
-        fresh.P[9:, 9:] = f.P[9:, 9:]  # the biases outlive an occlusion
-    return replace(
-        state,
-        filter=fresh,
-        lost=False,
-        disagreed=0,
-        light=int(angles.ticks[-1]),
-        rms_rad=fit.rms_rad,
-    )
-
-
-def _fit(
-    state: TrackerState, stations: Stations, hits: Hits, end: int, settings: TrackerSettings
-) -> Refined | None:
-    """A pose good enough to start from: by the known rotation, else from nothing."""
-    f = state.filter
-    if f is not None and end - state.light < settings.rotation_known_s * TICKS_PER_S:
-        fit = seed_with_rotation(stations, hits, f.R)
-        if fit is not None and _is_good(stations, hits, fit, settings):
-            return fit
-    # dear, hence not in every window: a device that is not seen enough would stall the others
-    if (end // settings.window) % settings.search_windows:
-        return None
-    up = state.imu.acc_g[-8:].mean(axis=0)
-    fit = seed(stations, hits, up / max(float(np.linalg.norm(up)), 1e-9))
-    return fit if fit is not None and _is_good(stations, hits, fit, settings) else None
-
-
-def _is_good(stations: Stations, hits: Hits, fit: Refined, settings: TrackerSettings) -> bool:
-    error = np.abs(residuals(stations, hits, fit.guess)[0])
-    sigma = float(np.sqrt(np.trace(fit.covariance[:3, :3])))
-    fits = float(np.mean(error < settings.seed_outlier_rad)) > 0.6
-    return sigma < settings.seed_sigma_m and fit.rms_rad < settings.seed_rms_rad and fits
-
-
-def _is_still(state: TrackerState, end: int, settings: TrackerSettings) -> bool:
-    i, j = np.searchsorted(state.imu.ticks, [end - int(settings.rest_s * TICKS_PER_S), end])
-    if j - i < 8 or state.imu.ticks[i] > end - 0.8 * settings.rest_s * TICKS_PER_S:
-        return False
-    gyro, acc = state.imu.gyro_rad_s[i:j], state.imu.acc_g[i:j]
-    f = state.filter
-    if (
-        gyro.std(axis=0).max() > settings.rest_gyro_rad_s
-        or acc.std(axis=0).max() > settings.rest_acc_g
-    ):
-        return False
-    if f is None:
-        return True
-    turning = np.linalg.norm(gyro.mean(axis=0) - f.gyro_bias)
-    return bool(
-        turning < 5.0 * settings.rest_gyro_rad_s and np.linalg.norm(f.v) < settings.rest_speed_m_s
-    )
-
-
-def _rest_gyro(state: TrackerState, end: int, settings: TrackerSettings) -> Array:
-    i, j = np.searchsorted(state.imu.ticks, [end - int(settings.rest_s * TICKS_PER_S), end])
-    return np.asarray(state.imu.gyro_rad_s[i:j].mean(axis=0))
-
-
 def _forget(state: TrackerState, end: int, settings: TrackerSettings) -> TrackerState:
     """Keep what the next windows need."""
     imu_since = end - int((settings.rest_s + 0.05) * TICKS_PER_S)
@@ -435,22 +225,3 @@ def _forget(state: TrackerState, end: int, settings: TrackerSettings) -> Tracker
     j = int(np.searchsorted(state.angles.ticks, light_since))
     imu = ImuSamples(state.imu.ticks[i:], state.imu.acc_g[i:], state.imu.gyro_rad_s[i:])
     return replace(state, imu=imu, angles=take_angles(state.angles, slice(j, None)))
-
-
-def join_poses(batches: Sequence[PoseBatch]) -> PoseBatch:
-    """Poses one after the other."""
-    full = [b for b in batches if len(b)]
-    if not full:
-        return PoseBatch(
-            np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3, 3)),
-            np.zeros((0, 3)), np.zeros((0, 6, 6)), np.zeros(0, np.int8),
-        )  # fmt: skip
-    return PoseBatch(
-        np.concatenate([b.ticks for b in full]),
-        np.concatenate([b.p for b in full]),
-        np.concatenate([b.v for b in full]),
-        np.concatenate([b.R for b in full]),
-        np.concatenate([b.angular_velocity for b in full]),
-        np.concatenate([b.covariance for b in full]),
-        np.concatenate([b.fix for b in full]),
-    )

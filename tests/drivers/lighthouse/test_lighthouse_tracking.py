@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.lighthouse_room import Motion, carried, device, imu_of, light_of, room, still, track
 
-from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Angles
+from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Angles, ImuSamples
 from lobstr_hw.drivers.lighthouse.light import take_angles
 from lobstr_hw.drivers.lighthouse.tracker import Fix, PoseBatch
 from lobstr_hw.rotations import Array, geodesic_angle
@@ -139,3 +139,22 @@ def test_nothing_comes_of_no_light() -> None:
     none = np.zeros(0, np.int64)
     poses = track(model, room(2), imu, Angles(none, none, none, none, np.zeros(0)))
     assert len(poses) == 0
+
+
+@pytest.mark.parametrize("silent_s", [0.05, 0.3, 3.0])
+def test_an_imu_that_was_silent_spoils_nothing(silent_s: float) -> None:
+    stations, model, motion = room(2), device(), carried(7)
+    imu = imu_of(motion, silent_s + 1.2, noise=1.0)
+    light = light_of(stations, model, motion, silent_s + 1.2, noise_rad=1e-4)
+    t = (imu.ticks - FIRST) / TICKS_PER_S
+    heard = (t < 0.6) | (t > 0.6 + silent_s)
+    imu = ImuSamples(imu.ticks[heard], imu.acc_g[heard], imu.gyro_rad_s[heard])
+    poses = track(model, stations, imu, without(light, 0.6, 0.6 + silent_s))
+    followed = (poses.fix != Fix.LOST) & (np.abs(times(poses) - 0.7) < 2.0)
+    assert np.max(off_m(poses, motion)[followed & (times(poses) > 0.3)]) < 0.02
+    assert not np.any(poses.fix[times(poses) > 0.85 + silent_s] == Fix.LOST)
+    whole = track(model, stations, imu, without(light, 0.6, 0.6 + silent_s), 2**40)
+    np.testing.assert_array_equal(whole.ticks, poses.ticks)
+    np.testing.assert_allclose(whole.p, poses.p, atol=1e-9)
+    eye = np.swapaxes(poses.R, 1, 2) @ poses.R
+    np.testing.assert_allclose(eye, np.broadcast_to(np.eye(3), eye.shape), atol=1e-6)

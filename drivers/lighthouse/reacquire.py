@@ -1,0 +1,78 @@
+"""A pose for a device that has none: at the start, and after it was lost."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, DeviceModel
+from lobstr_hw.drivers.lighthouse.inertial import gather
+from lobstr_hw.drivers.lighthouse.kalman import start
+from lobstr_hw.drivers.lighthouse.light import Hits, Stations, take_angles
+from lobstr_hw.drivers.lighthouse.pose_seed import seed, seed_with_rotation
+from lobstr_hw.drivers.lighthouse.refine import Refined, refine, residuals
+from lobstr_hw.drivers.lighthouse.tracker_state import TrackerSettings, TrackerState
+
+__all__ = ["reacquire"]
+
+
+def reacquire(
+    state: TrackerState,
+    end: int,
+    model: DeviceModel,
+    stations: Stations,
+    settings: TrackerSettings,
+) -> TrackerState:
+    """Look for the pose anew, in the hits up to a moment; nothing changes if there is none."""
+    since = end - int(settings.seed_s * TICKS_PER_S)
+    i, j = np.searchsorted(state.angles.ticks, [since, end], side="right")
+    angles = take_angles(state.angles, slice(int(i), int(j)))
+    if j - i < 8 or angles.ticks[-1] - angles.ticks[0] < settings.seed_span_s * TICKS_PER_S:
+        return state
+    if not len(state.imu) or state.imu.ticks[0] > since + settings.window:
+        return state
+    f = state.filter
+    gyro_bias = np.zeros(3) if f is None else f.gyro_bias
+    hits = gather(model, angles, state.imu, end, gyro_bias)
+    fit = _fit(state, stations, hits, end, settings)
+    if fit is None:
+        return state
+    # again, now that it is known which way it fell meanwhile
+    hits = gather(model, angles, state.imu, end, gyro_bias, fit.guess.R)
+    true = np.abs(residuals(stations, hits, fit.guess)[0]) < settings.seed_outlier_rad
+    fit = refine(stations, hits.select(true), fit.guess, 10)
+    acc_bias = np.zeros(3) if f is None else f.acc_bias
+    fresh = start(end, fit, acc_bias, gyro_bias, settings.filter)
+    if f is not None:
+        fresh.P[9:, 9:] = f.P[9:, 9:]  # the biases outlive an occlusion
+    return replace(
+        state,
+        filter=fresh,
+        lost=False,
+        disagreed=0,
+        light=int(angles.ticks[-1]),
+        rms_rad=fit.rms_rad,
+    )
+
+
+def _fit(
+    state: TrackerState, stations: Stations, hits: Hits, end: int, settings: TrackerSettings
+) -> Refined | None:
+    """A pose good enough to start from: by the known rotation, else from nothing."""
+    f = state.filter
+    if f is not None and end - state.light < settings.rotation_known_s * TICKS_PER_S:
+        fit = seed_with_rotation(stations, hits, f.R)
+        if fit is not None and _is_good(stations, hits, fit, settings):
+            return fit
+    # dear, hence not in every window: a device that is not seen enough would stall the others
+    if (end // settings.window) % settings.search_windows:
+        return None
+    up = state.imu.acc_g[-8:].mean(axis=0)
+    fit = seed(stations, hits, up / max(float(np.linalg.norm(up)), 1e-9))
+    return fit if fit is not None and _is_good(stations, hits, fit, settings) else None
+
+
+def _is_good(stations: Stations, hits: Hits, fit: Refined, settings: TrackerSettings) -> bool:
+    error = np.abs(residuals(stations, hits, fit.guess)[0])
+    sigma = float(np.sqrt(np.trace(fit.covariance[:3, :3])))
+    fits = float(np.mean(error < settings.seed_outlier_rad)) > 0.6
+    return sigma < settings.seed_sigma_m and fit.rms_rad < settings.seed_rms_rad and fits
