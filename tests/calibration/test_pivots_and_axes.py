@@ -26,7 +26,8 @@ VAGUE = np.eye(3)
 
 def turning(rng: np.random.Generator) -> Array:
     """Rotations (180, 3, 3) that go through all directions."""
-    return from_rotation_vector(smooth_noise(rng, TIMES, 3, 0.5)) @ random_rotations(rng, 1)[0]
+    wandering = from_rotation_vector(smooth_noise(rng, TIMES, 3, 0.5))
+    return np.asarray(wandering @ random_rotations(rng, 1)[0])
 
 
 def about(R: Array, lever: Array, pivot: Array) -> Array:

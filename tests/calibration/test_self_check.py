@@ -48,8 +48,11 @@ def test_good_ones_pass(seed: int) -> None:
 def test_a_tracker_that_slips_in_the_pose_is_named(tracker: int) -> None:
     rng = np.random.default_rng(tracker)
     role = str(FOUR_POINTS[tracker])
-    for change in ({"shift": any_direction(rng, 0.03)}, {"turn": any_direction(rng, 0.18)}):
-        check = judged(slipped(somebodys_take(tracker), tracker, IN_THE_POSE_S, **change))
+    take, when_s = somebodys_take(tracker), IN_THE_POSE_S
+    shifted = slipped(take, tracker, when_s, shift=any_direction(rng, 0.03))
+    turned = slipped(take, tracker, when_s, turn=any_direction(rng, 0.18))
+    for changed in (shifted, turned):
+        check = judged(changed)
         assert not check.ok
         assert role in check.failed[0].name
         assert "T-pose again" in check.reason
