@@ -1,6 +1,7 @@
 """The bars of tracking on libsurvive's simulated sets, whose truth is exact."""
 
 import importlib.util
+import os
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -10,7 +11,7 @@ import pytest
 pytest.importorskip("scipy", reason="pip install 'lobstr-hw[lighthouse]'")
 
 ROOT = Path(__file__).parents[3]
-SETS = ROOT.parent / "shared" / "data" / "lighthouse" / "sim"
+SETS = Path(os.environ.get("LOBSTR_DATA", ROOT.parent / "shared" / "data")) / "lighthouse" / "sim"
 NAMES = ["lh1_clean_a", "lh1_noisy_a", "lh2_clean_a", "lh2_noisy_a"]
 BARS = {"clean": (0.5, 0.05), "noisy": (2.0, 0.3)}
 """Median errors, mm and degrees; the 95th percentile may be three times as large."""
@@ -31,7 +32,7 @@ def tool() -> ModuleType:
 def path_of(name: str) -> Path:
     path = SETS / f"{name}.json"
     if not path.exists():
-        pytest.skip("the simulated Lighthouse sets are not beside the checkout")
+        pytest.skip("set LOBSTR_DATA to the folder that holds lighthouse/ to run this")
     return path
 
 
