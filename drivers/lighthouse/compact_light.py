@@ -14,6 +14,8 @@ __all__ = ["parse_compact_light"]
 
 TIME_BYTES = 3
 LONGEST = 0xFFFF
+LONGEST_DARK = 1 << 24
+"""Ticks (0.35 s) between edges of one message; the times of messages have no more bits."""
 
 
 def parse_compact_light(data: bytes, last_edge: int) -> list[Pulse]:
@@ -27,6 +29,8 @@ def parse_compact_light(data: bytes, last_edge: int) -> list[Pulse]:
     edges = [last_edge]  # latest first
     while front > 0 and 2 * front > len(edges):
         interval, front = _number_before(data, front)
+        if interval > LONGEST_DARK:
+            return []
         edges.append(edges[-1] - interval)
     if front <= 0 or len(edges) != 2 * front:
         return []

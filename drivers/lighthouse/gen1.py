@@ -121,6 +121,8 @@ class Gen1Decoder:
         _half_turn(lock, head[before & (head[:, 1] >= end - HALF_TURN)], found)
         if lock.confidence < 0 or min(lock.missed[k] for k in lock.due) > GIVEN_UP:
             self._lock, self._tried = None, 0
+            # or else pulses in the wrong order could make the same rhythm be found again for ever
+            self._waiting = self._waiting[self._waiting[:, 1] >= end]
         return True
 
     def _find(self, found: _Found) -> bool:

@@ -3,7 +3,7 @@
 import math
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -11,8 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lobstr_hw.drivers.lighthouse import gen1
 from lobstr_hw.drivers.lighthouse.angles import Angles, Ints, StationCalibration
 from lobstr_hw.drivers.lighthouse.gen1 import Gen1Decoder
+from lobstr_hw.drivers.lighthouse.gen1_pattern import Flash, Rhythm, find_rhythm
 from lobstr_hw.drivers.lighthouse.gen2 import PERIODS, Gen2Decoder
 from lobstr_hw.drivers.lighthouse.ootx import GEN1_PAYLOAD, GEN2_PAYLOAD, OotxReader, StationBits
 from lobstr_hw.drivers.lighthouse.raw_events import RawEvents
@@ -126,6 +128,31 @@ def test_gen1_reflections_and_noise_are_not_taken_for_stations() -> None:
     angles, told = Gen1Decoder().decode(noise)
     assert len(angles) == 0
     assert not any(bits.bits for bits in told)
+
+
+@pytest.mark.parametrize("seed", [13, 66, 159])
+def test_found_and_lost_the_rhythm_uses_pulses_up(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some pulses have times of elsewhere, so that a rhythm is found and at once lost again."""
+    calls = []
+
+    def counted(flashes: Sequence[Flash]) -> Rhythm | None:
+        calls.append(len(flashes))
+        assert len(calls) < 1_000, "the same rhythm is found again and again"
+        return find_rhythm(flashes)
+
+    monkeypatch.setattr(gen1, "find_rhythm", counted)
+    rng = np.random.default_rng(seed)
+    pulses, _ = gen1_pulses(int(rng.integers(4, 14)), GEN1_ANGLES, seed=seed)
+    spread = 10 ** int(rng.integers(4, 9))
+    astray = rng.random(len(pulses)) < rng.choice([0.02, 0.1, 0.3])
+    pulses[astray, 1] += rng.integers(-spread, spread, astray.sum())
+    order = np.arange(len(pulses))
+    if rng.random() < 0.5:
+        order = np.argsort(pulses[:, 1] + rng.integers(0, spread, len(pulses)))
+    angles, _ = Gen1Decoder().decode(pulses[order])
+    assert len(angles) <= len(pulses)
 
 
 def test_gen1_goes_on_after_the_light_was_away() -> None:
@@ -290,21 +317,21 @@ def station_payload(generation: int, **numbers: float) -> bytes:
 
 def test_a_station_message_is_read_by_its_table() -> None:
     numbers = {"p0": 0.5, "p1": -0.25, "t0": 0.125, "t1": -0.5, "c0": 0.75, "g0": 3.0, "g1": -1.0}
-    gen1 = parse_station(station_payload(1, **numbers))
-    gen2 = parse_station(station_payload(2, **numbers))
-    assert gen1 is not None
-    assert gen2 is not None
-    for station in (gen1, gen2):
+    first = parse_station(station_payload(1, **numbers))
+    second = parse_station(station_payload(2, **numbers))
+    assert first is not None
+    assert second is not None
+    for station in (first, second):
         assert (station.id, station.mode, station.unlock_count) == (0xBEC08E38, 1, 3)
         np.testing.assert_array_equal(station.up, [0, 1, 0])
         np.testing.assert_array_equal(station.phase, [0.5, -0.25])
         np.testing.assert_array_equal(station.curve, [0.75, 0])
         np.testing.assert_array_equal(station.gibphase, [3, -1])
         np.testing.assert_array_equal(station.gibmag, [0.25, -0.5])
-    np.testing.assert_array_equal(gen1.tilt, np.tan([0.125, -0.5]))
-    np.testing.assert_array_equal(gen2.tilt, [0.125, -0.5])
-    np.testing.assert_array_equal(gen2.ogeephase, [1, 2])
-    np.testing.assert_array_equal(gen2.ogeemag, [-0.25, 0.5])
+    np.testing.assert_array_equal(first.tilt, np.tan([0.125, -0.5]))
+    np.testing.assert_array_equal(second.tilt, [0.125, -0.5])
+    np.testing.assert_array_equal(second.ogeephase, [1, 2])
+    np.testing.assert_array_equal(second.ogeemag, [-0.25, 0.5])
 
 
 @given(st.one_of(st.binary(max_size=50), PAYLOADS))
@@ -336,9 +363,9 @@ def test_a_point_further_out_on_the_same_ray_has_the_same_angles(
 @given(st.floats(-1.2, 1.2))
 def test_in_the_horizontal_plane_ideal_angles_are_the_bearing(bearing: float) -> None:
     point = np.array([math.sin(bearing), 0.0, -math.cos(bearing)])
-    gen1, gen2 = (reproject(StationCalibration(g), point) for g in (1, 2))
-    np.testing.assert_allclose(gen1[0], -bearing, atol=1e-12)
-    np.testing.assert_allclose(gen2, -bearing, atol=1e-12)
+    first, second = (reproject(StationCalibration(g), point) for g in (1, 2))
+    np.testing.assert_allclose(first[0], -bearing, atol=1e-12)
+    np.testing.assert_allclose(second, -bearing, atol=1e-12)
 
 
 WHEN = st.one_of(st.integers(0, 2**26), st.integers(0, 2**50))
@@ -364,9 +391,9 @@ def test_any_events_give_angles_of_a_half_turn_or_nothing(
         sweeps=np.array(sweeps, dtype=np.int64).reshape(-1, 4),
         syncs_before=np.array(sorted(data.draw(places)), dtype=np.int64),
     )
-    gen1, _ = Gen1Decoder().decode(events.pulses)
-    gen2, _ = Gen2Decoder().decode(events)
-    assert len(gen1) <= len(pulses)
-    assert len(gen2) <= len(sweeps)
-    assert (np.abs(gen1.angle_rad) < math.pi / 2).all()
-    assert (np.abs(gen2.angle_rad) <= 4 * math.pi / 3).all()
+    one, _ = Gen1Decoder().decode(events.pulses)
+    two, _ = Gen2Decoder().decode(events)
+    assert len(one) <= len(pulses)
+    assert len(two) <= len(sweeps)
+    assert (np.abs(one.angle_rad) < math.pi / 2).all()
+    assert (np.abs(two.angle_rad) <= 4 * math.pi / 3).all()

@@ -149,6 +149,8 @@ def test_compact_light_pairs_overlapping_pulses_by_the_edges_they_skip() -> None
 def test_light_that_contradicts_itself_is_none() -> None:
     assert parse_compact_light(bytes([1 << 3 | 5, 0x8A]) + b"\0\0\0", 1_000) == []
     assert parse_compact_light(bytes([1 << 3, 2 << 3, 0x8A]) + b"\0\0\0", 1_000) == []
+    without_end = bytes([1 << 3, 0xFF, *[0x7F] * 18]) + b"\0\0\0"
+    assert parse_compact_light(without_end, 1_000) == []
 
 
 TICKS = 0x12345600
