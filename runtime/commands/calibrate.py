@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lobstr_hw.errors import LobstrError, ProfileError
+from lobstr_hw.runtime.commands.numbers import above_zero, between
 from lobstr_hw.runtime.profile_path import default_profile_path
 from lobstr_hw.runtime.stopping import StopRequest
 
@@ -71,55 +72,33 @@ def _parser() -> argparse.ArgumentParser:
     add("--sim", type=Path, metavar="LOG", help="look for the T-pose in a tracker log")
     add("--driver", action="append", default=[], metavar="NAME[:k=v,...]", help="listen to devices")
     add("--profile", type=Path, metavar="FILE", help="where it goes (your configuration folder)")
-    add("--height", type=_stature, metavar="CM", help="your height; otherwise the headset tells")
+    add(
+        "--height",
+        type=between(*STATURES_CM, "cm"),
+        metavar="CM",
+        help="your height; otherwise the headset tells",
+    )
     add(
         "--floor",
-        type=_clearance,
+        type=between(*CLEARANCES_CM, "cm"),
         nargs="?",
         const=3.0,
         metavar="CM",
         help="touch the floor with a controller first; CM from the floor to the controller's own "
         "origin when it does (3)",
     )
-    add("--countdown", type=_countdown, default=0.0, metavar="S", help="before every step (0)")
-    add("--timeout", type=_seconds, metavar="S", help="give up after so long")
+    add(
+        "--countdown",
+        type=between(0.0, LONGEST_COUNTDOWN_S, "s"),
+        default=0.0,
+        metavar="S",
+        help="before every step (0)",
+    )
+    add("--timeout", type=above_zero, metavar="S", help="give up after so long")
     add("--no-speech", action="store_true", help="bells only")
     add("--yes", action="store_true", help="ask nothing; an old profile is replaced")
     add("--json", action="store_true", help="the result on stdout, as one JSON document")
     return parser
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number") from error
-
-
-def _between(text: str, limits: tuple[float, float], unit: str) -> float:
-    value, (low, high) = _number(text), limits
-    if not low <= value <= high:
-        raise argparse.ArgumentTypeError(f"{text} {unit} is not between {low:g} and {high:g}")
-    return value
-
-
-def _stature(text: str) -> float:
-    return _between(text, STATURES_CM, "cm")
-
-
-def _clearance(text: str) -> float:
-    return _between(text, CLEARANCES_CM, "cm")
-
-
-def _countdown(text: str) -> float:
-    return _between(text, (0.0, LONGEST_COUNTDOWN_S), "s")
-
-
-def _seconds(text: str) -> float:
-    value = _number(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
-    return value
 
 
 def _run(args: argparse.Namespace, stop: Callable[[], bool]) -> int:

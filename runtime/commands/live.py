@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lobstr_hw.errors import LobstrError
+from lobstr_hw.runtime.commands.numbers import between, zero_or_more
 from lobstr_hw.runtime.outputs.sinks import SINKS, SinkSpec, parse_sink
 from lobstr_hw.runtime.stopping import StopRequest
 
@@ -69,8 +70,14 @@ def _parser() -> argparse.ArgumentParser:
     add("--driver", action="append", default=[], metavar="NAME[:k=v,...]", help="listen to devices")
     add("--profile", type=Path, metavar="FILE", help="calibration profile; without: do a T-pose")
     add("--predictor", default="lobstr", metavar="NAME|FILE", help="moves the legs (lobstr)")
-    add("--rate", type=_rate, default=45.0, metavar="HZ", help="frames per second (45)")
-    add("--input-delay", type=_positive, default=10.0, metavar="MS", help="of the legs (10)")
+    add(
+        "--rate",
+        type=between(*RATES_HZ, "Hz"),
+        default=45.0,
+        metavar="HZ",
+        help="frames per second (45)",
+    )
+    add("--input-delay", type=zero_or_more, default=10.0, metavar="MS", help="of the legs (10)")
     add(
         "--output",
         action="append",
@@ -80,34 +87,12 @@ def _parser() -> argparse.ArgumentParser:
         help=f"NAME:FILE with NAME one of {', '.join(SINKS)}; may be repeated",
     )
     add("--take", metavar="NAME", help="name of this recording")
-    add("--duration", type=_positive, metavar="S", help="seconds from the first frame")
+    add("--duration", type=zero_or_more, metavar="S", help="seconds from the first frame")
     add("--summary", type=Path, metavar="FILE", help="write a JSON summary at the end")
     add("--no-speech", action="store_true", help="bells only, no words for somebody in a headset")
     add("--quiet", action="store_true", help="no status line and no closing words")
     add("--json", action="store_true", help="the summary on stdout, as one JSON document")
     return parser
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number") from error
-
-
-def _rate(text: str) -> float:
-    rate_hz = _number(text)
-    low, high = RATES_HZ
-    if not low <= rate_hz <= high:
-        raise argparse.ArgumentTypeError(f"{text} Hz is not between {low:g} and {high:g}")
-    return rate_hz
-
-
-def _positive(text: str) -> float:
-    value = _number(text)
-    if not 0.0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not a number of 0 or more")
-    return value
 
 
 def _sink(text: str) -> SinkSpec:

@@ -13,6 +13,7 @@ from lobstr_hw.motion import Motion
 from lobstr_hw.retargeting import ClipFile, Note, find_clips, retarget
 from lobstr_hw.rotations import to_quat_xyzw
 from lobstr_hw.runtime.commands.log_report import Report, Step, Subparsers, progress_bar, whole_file
+from lobstr_hw.runtime.commands.numbers import above_zero, between
 from lobstr_hw.simulation import SimulatedTake, SimulatedUser, joined, simulate, take_samples
 from lobstr_hw.trackers import FOUR_POINTS, TrackerSample, TrackingState
 
@@ -36,16 +37,19 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     parser.add_argument("out", type=Path, metavar="OUT.mcap", help="the log to write")
     parser.add_argument(
         "--scale",
-        type=_positive,
+        type=above_zero,
         metavar="METRES_PER_UNIT",
         help="of the clip's lengths (told from its legs otherwise)",
     )
     parser.add_argument("--seed", type=int, default=0, help="of everything random (0)")
     parser.add_argument(
-        "--height", type=_stature, metavar="CM", help="stature of the user (drawn, 150 to 195)"
+        "--height",
+        type=between(100.0, 230.0, "cm"),
+        metavar="CM",
+        help="stature of the user (drawn, 150 to 195)",
     )
     parser.add_argument(
-        "--rate", type=_positive, default=90.0, metavar="HZ", help="of the trackers (90)"
+        "--rate", type=above_zero, default=90.0, metavar="HZ", help="of the trackers (90)"
     )
     return parser
 
@@ -154,17 +158,3 @@ def _user(user: SimulatedUser) -> dict[str, str]:
         numbers = np.concatenate([mount.p, to_quat_xyzw(mount.R)])
         words[f"T_{role.value}_tracker"] = " ".join(f"{v:.6f}" for v in numbers)
     return words
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not a positive number")
-    return value
-
-
-def _stature(text: str) -> float:
-    value = float(text)
-    if not 100.0 <= value <= 230.0:
-        raise argparse.ArgumentTypeError(f"{text} is not a stature in centimetres (100 to 230)")
-    return value

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lobstr_hw.errors import LobstrError, OutputError
+from lobstr_hw.runtime.commands.numbers import above_zero, between
 from lobstr_hw.runtime.stopping import StopRequest
 
 if TYPE_CHECKING:
@@ -64,34 +65,18 @@ def _parser() -> argparse.ArgumentParser:
     add("out", type=Path, metavar="OUT.mcap", help="the log to write")
     add("--driver", action="append", default=[], metavar="NAME[:k=v,...]", help="listen to devices")
     add("--profile", type=Path, metavar="FILE", help="names the trackers, and goes into the log")
-    add("--duration", type=_seconds, metavar="S", help="seconds to record")
-    add("--rate", type=_rate, default=90.0, metavar="HZ", help="how often devices are asked (90)")
+    add("--duration", type=above_zero, metavar="S", help="seconds to record")
+    add(
+        "--rate",
+        type=between(*RATES_HZ, "Hz"),
+        default=90.0,
+        metavar="HZ",
+        help="how often devices are asked (90)",
+    )
     add("--force", action="store_true", help="replace a file that is there")
     add("--quiet", action="store_true", help="no status lines and no closing words")
     add("--json", action="store_true", help="the outcome on stdout, as one JSON document")
     return parser
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number") from error
-
-
-def _rate(text: str) -> float:
-    rate_hz = _number(text)
-    low, high = RATES_HZ
-    if not low <= rate_hz <= high:
-        raise argparse.ArgumentTypeError(f"{text} Hz is not between {low:g} and {high:g}")
-    return rate_hz
-
-
-def _seconds(text: str) -> float:
-    value = _number(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
-    return value
 
 
 def _run(args: argparse.Namespace, stop: StopRequest) -> int:
