@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from results_page import shown, write_section
 
 from lobstr_hw.calibration import Calibration, TPose, TPoseDetector, calibrate_t_pose
 from lobstr_hw.calibration.heading import hands_heading, turn_between
@@ -27,7 +28,6 @@ from lobstr_hw.simulation import PoseDeviation, SimulatedTake, Sway, simulate, t
 from lobstr_hw.simulation.t_pose import t_pose_motion
 from lobstr_hw.trackers import FOUR_POINTS, TrackerRole
 
-RESULTS = Path(__file__).parent.parent / "docs" / "results.md"
 TITLE = "## Calibration"
 CLIP_S = 3.0
 
@@ -53,7 +53,7 @@ def main() -> int:
     text = "\n".join([_head(args, len(motions)), *tables])
     print(text)
     if args.write:
-        write_section(RESULTS, TITLE, text)
+        write_section(text)
     return 0
 
 
@@ -173,7 +173,7 @@ def _two(values: Array) -> str:
 
 
 def _head(args: argparse.Namespace, motions: int) -> str:
-    clips = " ".join(_shown(path) for path in args.clips)
+    clips = " ".join(shown(path) for path in args.clips)
     command = f"python tools/calibration_table.py --users {args.users} --seed {args.seed} {clips}"
     date = datetime.datetime.now(tz=datetime.UTC).date()
     return f"""{TITLE}
@@ -186,20 +186,6 @@ offsets are between the true and the found joint frame.
 
 `{command.strip()}`, {date}.
 """
-
-
-def _shown(path: Path) -> str:
-    """Data set and below: where the data lies is everybody's own business."""
-    return "/".join(path.parts[-2:]) if path.is_absolute() else path.as_posix()
-
-
-def write_section(path: Path, title: str, text: str) -> None:
-    """Put a section in its place, or at the end of the file."""
-    old = path.read_text(encoding="utf-8") if path.exists() else "# Results\n"
-    before, found, rest = old.partition(title + "\n")
-    _, more, after = rest.partition("\n## ") if found else ("", "", "")
-    new = before.rstrip() + "\n\n" + text.rstrip() + "\n"
-    path.write_text(new + ("\n## " + after if more else ""), encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from results_page import write_section
 
 from lobstr_hw.drivers.lighthouse.angles import Ints
 from lobstr_hw.drivers.lighthouse.captured_device import CapturedDevice, read_devices
@@ -242,14 +243,6 @@ def _speed(captures: list[Capture]) -> list[str]:
     return lines
 
 
-def replace_section(path: Path, text: str) -> None:
-    """Put a section in the place of the one of the same heading, or at the end."""
-    before, found, after = path.read_text(encoding="utf-8").partition(HEADING + "\n")
-    at = after.find("\n## ")
-    rest = after[at:] if found and at >= 0 else ""
-    path.write_text(before.rstrip() + "\n\n" + text.rstrip() + "\n" + rest, encoding="utf-8")
-
-
 def main() -> int:
     """Print the section; write it where asked; fail below 99.5 %."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=_Raw)
@@ -268,7 +261,7 @@ def main() -> int:
     text = section(captures, found, command)
     print(text)
     if asked.write is not None:
-        replace_section(asked.write, text)
+        write_section(text, asked.write)
     worst = min((a.share for a in found), default=0.0)
     return 0 if worst >= 0.995 else 1
 

@@ -8,12 +8,12 @@ calibrates by the T-pose each time, and the two lower bodies are compared joint 
 
 import argparse
 import datetime
-import importlib.util
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from results_page import write_section
 
 from lobstr_hw.avatar import Avatar
 from lobstr_hw.calibration import Calibration, TPoseDetector, calibrate_t_pose
@@ -64,7 +64,7 @@ def main() -> int:
     text = "\n".join([_head(args, motions), *_table(predictor, motions, seeds)])
     print(text)
     if args.write:
-        _results().write_section(_results().RESULTS, TITLE, text)
+        write_section(text)
     return 0
 
 
@@ -137,12 +137,12 @@ def _frames(
     order = [FOUR_POINTS.index(role) for role in roles]
     each = []
     for take, calibration in zip(takes, calibrations, strict=True):
-        p, R, tracked = (v[::2, order] for v in (take.p, take.R, take.tracked))
-        each.append(calibration.frame(0.0, roles, p, R, tracked, tracked))
-    p, R, valid = (
-        np.stack(v, axis=1)
-        for v in ([f.p for f in each], [f.R for f in each], [f.valid_p for f in each])
-    )
+        tracked = take.tracked[::2, order]
+        poses = take.p[::2, order], take.R[::2, order]
+        each.append(calibration.frame(0.0, roles, *poses, tracked, tracked))
+    p = np.stack([f.p for f in each], axis=1)
+    R = np.stack([f.R for f in each], axis=1)
+    valid = np.stack([f.valid_p for f in each], axis=1)
     return [Frame(i / 45.0, roles, p[i], R[i], valid[i], valid[i]) for i in range(len(p))]
 
 
@@ -183,17 +183,6 @@ own T-pose: geodesic angle between the legs' local rotations of the two output s
 
 `{command}`, {date}.
 """
-
-
-def _results():  # type: ignore[no-untyped-def]
-    """The neighbour that knows where results go; tools are scripts, not a package."""
-    path = Path(__file__).with_name("calibration_table.py")
-    spec = importlib.util.spec_from_file_location("calibration_table", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 if __name__ == "__main__":

@@ -9,13 +9,13 @@ under 1000 are for choosing, those from 5000 for reporting.
 
 import argparse
 import datetime
-import importlib.util
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from results_page import shown, write_section
 
 from lobstr_hw.calibration import (
     Calibration,
@@ -80,8 +80,7 @@ def main() -> int:
     text = "\n".join([_head(args), *_tables(pairs)])
     print(text)
     if args.write:
-        results = _results()
-        results.write_section(results.RESULTS, TITLE, text)
+        write_section(text)
     return 0
 
 
@@ -242,8 +241,7 @@ def _two(values: Array) -> str:
 
 
 def _head(args: argparse.Namespace) -> str:
-    results = _results()
-    clips = " ".join(results._shown(path) for path in args.clips)
+    clips = " ".join(shown(path) for path in args.clips)
     flag = " --steady" if args.steady else ""
     command = (
         f"python tools/movement_table.py --users {args.users} --seed {args.seed}{flag} {clips}"
@@ -257,17 +255,6 @@ is assumed). Roles told apart by geometry.
 
 `{command.strip()}`, {date}.
 """
-
-
-def _results():  # type: ignore[no-untyped-def]
-    """The neighbour that knows where results go; tools are scripts, not a package."""
-    path = Path(__file__).with_name("calibration_table.py")
-    spec = importlib.util.spec_from_file_location("calibration_table", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 if __name__ == "__main__":

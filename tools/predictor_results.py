@@ -8,12 +8,13 @@ is there is not made again. With --write the section is put into the page, else 
 
 import argparse
 import json
-import re
 import sys
 from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
 from typing import Any
+
+from results_page import write_section
 
 from lobstr_hw.evaluation.evaluate import evaluate
 from lobstr_hw.evaluation.rollout import Mode
@@ -64,7 +65,7 @@ def main() -> None:
         _measure(options, part)
     section = _section(options)
     if options.write:
-        _replace(options.write, section)
+        write_section(section, options.write)
     else:
         print(section)
 
@@ -174,13 +175,6 @@ def _by_set(tree: dict[str, Any]) -> str:
         rows.append((f"{folder}: network", pair["network"]))
         rows.append((f"{folder}: after IK", pair["after_ik"]))
     return markdown_table(rows)
-
-
-def _replace(page: Path, section: str) -> None:
-    text = page.read_text(encoding="utf-8") if page.is_file() else "# Results\n"
-    heading = re.escape(section.splitlines()[0])
-    rest = re.sub(rf"^{heading}\n.*?(?=^## |\Z)", "", text, flags=re.DOTALL | re.MULTILINE)
-    page.write_text(rest.rstrip() + "\n\n" + section, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -8,12 +8,12 @@ predictor three times: by the true offsets, by the profile after the movement, b
 
 import argparse
 import datetime
-import importlib.util
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from results_page import shown, write_section
 
 from lobstr_hw.calibration import (
     Calibration,
@@ -75,8 +75,7 @@ def main() -> int:
     text = "\n".join([_head(args, wearers), *_table(predictor, wearers)])
     print(text)
     if args.write:
-        results = _results()
-        results.write_section(results.RESULTS, TITLE, text)
+        write_section(text)
     return 0
 
 
@@ -193,8 +192,7 @@ def _frame(wearer: Wearer, which: int) -> Frame:
 
 
 def _head(args: argparse.Namespace, wearers: Sequence[Wearer]) -> str:
-    results = _results()
-    clips = " ".join(results._shown(path) for path in args.clips)
+    clips = " ".join(shown(path) for path in args.clips)
     command = f"python tools/profile_error.py {clips} --users {args.users} --seed {args.seed}"
     date = datetime.datetime.now(tz=datetime.UTC).date()
     seconds = sum(len(w.truth) / w.truth.rate_hz for w in wearers)
@@ -207,17 +205,6 @@ root and heading given; "its own heading": under the heading that the calibrated
 
 `{command}`, {date}.
 """
-
-
-def _results():  # type: ignore[no-untyped-def]
-    """The neighbour that knows where results go; tools are scripts, not a package."""
-    path = Path(__file__).with_name("calibration_table.py")
-    spec = importlib.util.spec_from_file_location("calibration_table", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 if __name__ == "__main__":

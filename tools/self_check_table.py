@@ -8,14 +8,13 @@ is rejected when no T-pose is found or the self-check says no; either way with a
 
 import argparse
 import datetime
-import importlib.util
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import permutations
-from pathlib import Path
 
 import numpy as np
+from results_page import write_section
 
 from lobstr_hw.calibration import (
     TPoseDetector,
@@ -67,8 +66,7 @@ def main() -> int:
     text = "\n".join([_head(args), *_table(args.users, args.seed, args.only or "")])
     print(text)
     if args.write:
-        results = _results()
-        results.write_section(results.RESULTS, TITLE, text)
+        write_section(text)
     return 0
 
 
@@ -304,17 +302,6 @@ are Wilson's.
 
 `{command}`, {date}.
 """
-
-
-def _results():  # type: ignore[no-untyped-def]
-    """The neighbour that knows where results go; tools are scripts, not a package."""
-    path = Path(__file__).with_name("calibration_table.py")
-    spec = importlib.util.spec_from_file_location("calibration_table", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 if __name__ == "__main__":

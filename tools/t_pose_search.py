@@ -9,13 +9,12 @@ are T-poses of real people, sloppier than simulated ones: what they calibrate to
 
 import argparse
 import datetime
-import importlib.util
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
+from calibration_table import Case, measures_table, offsets_table
+from results_page import write_section
 
 from lobstr_hw.calibration import TPose, TPoseDetector, calibrate_t_pose
 from lobstr_hw.motion import Motion
@@ -35,29 +34,16 @@ def main() -> int:
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--write", action="store_true")
     args = parser.parse_args()
-    table = _calibration_table()
-    text = "\n".join([_head(args.folders), *_report(table, args.folders)])
+    text = "\n".join([_head(args.folders), *_report(args.folders)])
     print(text)
     if args.write:
-        table.write_section(table.RESULTS, TITLE, text)
+        write_section(text)
     return 0
 
 
-def _calibration_table() -> ModuleType:
-    """The neighbour that makes tables; tools are scripts, not a package."""
-    path = Path(__file__).with_name("calibration_table.py")
-    spec = importlib.util.spec_from_file_location("calibration_table", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
-
-
-def _report(table: ModuleType, folders: Sequence[Path]) -> list[str]:
+def _report(folders: Sequence[Path]) -> list[str]:
     rows = ["| set | pieces | minutes | finds | of these T-poses |", "|---|---|---|---|---|"]
-    cases: list[object] = []
+    cases: list[Case] = []
     off_deg: list[float] = []
     for folder in folders:
         seconds, finds, true = 0.0, 0, 0
@@ -73,11 +59,13 @@ def _report(table: ModuleType, folders: Sequence[Path]) -> list[str]:
             off_deg.append(_arms_off_deg(take, pose))
             if off_deg[-1] < STRAIGHT_OUT_DEG:
                 true += 1
-                cases += list(_users(table, motion, i))
+                cases += list(_users(motion, i))
         rows.append(
             f"| {folder.parent.name if folder.name == 'clips' else folder.name} | {len(motions)} "
             f"| {seconds / 60.0:.0f} | {finds} | {true} |"
         )
+    if not cases:
+        return [*rows, "", "Nothing in these sets was taken for a T-pose that is one."]
     return [
         *rows,
         "",
@@ -86,20 +74,20 @@ def _report(table: ModuleType, folders: Sequence[Path]) -> list[str]:
         f"users ({len(cases)} cases; the performers held no controllers, so the turn of their "
         "hands about the arm says little about people who do):",
         "",
-        *table.offsets_table(cases),
+        *offsets_table(cases),
         "",
-        *table.measures_table(cases, heading=False),
+        *measures_table(cases, heading=False),
     ]
 
 
-def _users(table: ModuleType, motion: Motion, first: int) -> Iterator[object]:
+def _users(motion: Motion, first: int) -> Iterator[Case]:
     """The same T-pose on other bodies, with other mounts."""
     for user in range(USERS):
         take = simulate(motion, first + 10_000 * user, rate_hz=45.0, t_pose_s=0.0)
         hints = {serial: role for role, serial in take.serials.items()}
         pose = TPoseDetector(hints, every_s=0.2).add(take_samples(take))
         if pose is not None:
-            yield table.Case(take, pose, calibrate_t_pose(pose))
+            yield Case(take, pose, calibrate_t_pose(pose))
 
 
 def _arms_off_deg(take: SimulatedTake, pose: TPose) -> float:

@@ -14,6 +14,7 @@ from lobstr_hw.rotations import (
     Array,
     from_axis_angle,
     from_rotation_vector,
+    heading,
     normalize,
     rotation_x,
     rotation_y,
@@ -367,7 +368,7 @@ def _arms(
     together = rng.random() < 0.5  # both hands the same way round, or mirrored
     hang = _ramp(t, plan.lower)
     # a bow with arms hanging: they stay vertical
-    plumb = slerp(R[:, Joint.UPPER_CHEST], _upright(R[:, Joint.UPPER_CHEST]), 0.8 * hang)
+    plumb = slerp(R[:, Joint.UPPER_CHEST], heading(R[:, Joint.UPPER_CHEST]), 0.8 * hang)
     joints = (
         (Joint.LEFT_UPPER_ARM, Joint.LEFT_LOWER_ARM, Joint.LEFT_HAND),
         (Joint.RIGHT_UPPER_ARM, Joint.RIGHT_LOWER_ARM, Joint.RIGHT_HAND),
@@ -401,24 +402,19 @@ def _arms(
         )
         carried = R[:, upper] @ rotation_y(-side * elbow)
         R[:, lower] = carried @ rotation_x(sign * twist_wave + roll)
-        rest = from_rotation_vector(flip * _degrees(rng, 3.0, 4.0, 4.0) * np.array([1.0, 1.0, 1.0]))
+        rest = from_rotation_vector(flip * _degrees(rng, 3.0, 4.0, 4.0))
         R[:, hand] = carried @ rest @ twist @ bend @ from_rotation_vector(slack)
-
-
-def _upright(R: Array) -> Array:
-    yaw = np.arctan2(R[:, 0, 2] - R[:, 2, 0], R[:, 0, 0] + R[:, 2, 2])
-    return rotation_y(yaw)
 
 
 def _standing(p_hips: Array, feet: Feet, R: Array) -> Motion:
     """The motion of these world rotations with the legs put under the hips."""
     hips = plant(p_hips, R[:, 0], feet.p, 0.004)
     middle = slerp(feet.R[:, 0], feet.R[:, 1], 0.5)
-    like = np.broadcast_to(_upright(middle)[:, None, None], (len(R), 2, 2, 3, 3))
+    like = np.broadcast_to(heading(middle)[:, None, None], (len(R), 2, 2, 3, 3))
     R[:, LEGS[:, :2]] = rotations_to_ankles(hips, R[:, 0], feet.p, like)
     R[:, LEGS[:, 2]] = feet.R
     # toes stay flat while the heel rises
-    flat = np.stack([_upright(feet.R[:, i]) for i in (0, 1)], axis=1)
+    flat = np.stack([heading(feet.R[:, i]) for i in (0, 1)], axis=1)
     R[:, LEGS[:, 3]] = flat
     R_local = local_rotations(R)
     p_toes = forward_kinematics(R_local, hips)[0][:, LEGS[:, 3]]

@@ -1,30 +1,15 @@
 """After calibration the body must not depend on how the trackers are strapped on."""
 
-import importlib.util
-from pathlib import Path
-from types import ModuleType
-
+import mount_invariance as tool
 import numpy as np
 import pytest
 from support.motions import walking
 
 from lobstr_hw.motion import Motion
 from lobstr_hw.predictors import load_predictor
-from lobstr_hw.simulation import TrackingErrors
+from lobstr_hw.simulation import TrackingErrors, drawn_user
 
 SEEDS = (1, 2, 3, 4, 5, 6)
-
-
-@pytest.fixture(scope="module")
-def tool() -> ModuleType:
-    """The measuring script itself, so that test and table cannot differ."""
-    path = Path(__file__).parents[2] / "tools" / "mount_invariance.py"
-    spec = importlib.util.spec_from_file_location("mount_invariance", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +19,7 @@ def walk() -> Motion:
 
 @pytest.mark.parametrize("errors", [TrackingErrors.none(), TrackingErrors()])
 def test_two_sets_of_mounts_give_lower_bodies_within_two_degrees(
-    tool: ModuleType, walk: Motion, errors: TrackingErrors
+    walk: Motion, errors: TrackingErrors
 ) -> None:
     apart = tool.apart(load_predictor("lobstr"), walk, SEEDS, errors, 10.0)
     assert apart.shape[1:] == (6, 6)
@@ -42,9 +27,9 @@ def test_two_sets_of_mounts_give_lower_bodies_within_two_degrees(
 
 
 def test_the_same_mounts_give_the_same_lower_body(
-    tool: ModuleType, walk: Motion, monkeypatch: pytest.MonkeyPatch
+    walk: Motion, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    drawn = tool.drawn_user
+    drawn = drawn_user
     monkeypatch.setattr(tool, "drawn_user", lambda seed, mount_seed: drawn(seed, mount_seed=0))
     apart = tool.apart(load_predictor("standing"), walk, SEEDS[:2], TrackingErrors.none(), 10.0)
     assert np.max(apart) < 1e-6

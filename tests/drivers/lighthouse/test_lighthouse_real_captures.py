@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lighthouse_decode import compare, decode_capture
 
 from lobstr_hw.drivers.lighthouse.angles import StationCalibration
 from lobstr_hw.drivers.lighthouse.decoding import DeviceDecoder
 from lobstr_hw.drivers.lighthouse.device_config import parse_config
 from lobstr_hw.drivers.lighthouse.recordings import read_recording
 from lobstr_hw.drivers.lighthouse.reprojection import reproject
-from tools.lighthouse_decode import compare, decode_capture
 
 ENOUGH = 0.995
 STATIONS = {

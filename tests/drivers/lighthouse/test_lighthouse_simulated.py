@@ -1,32 +1,18 @@
 """The bars of tracking on libsurvive's simulated sets, whose truth is exact."""
 
-import importlib.util
 import os
-import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
 pytest.importorskip("scipy", reason="pip install 'lobstr-hw[lighthouse]'")
+tool = pytest.importorskip("lighthouse_sim")
 
 ROOT = Path(__file__).parents[3]
 SETS = Path(os.environ.get("LOBSTR_DATA", ROOT.parent / "shared" / "data")) / "lighthouse" / "sim"
 NAMES = ["lh1_clean_a", "lh1_noisy_a", "lh2_clean_a", "lh2_noisy_a"]
 BARS = {"clean": (0.5, 0.05), "noisy": (2.0, 0.3)}
 """Median errors, mm and degrees; the 95th percentile may be three times as large."""
-
-
-@pytest.fixture(scope="module")
-def tool() -> ModuleType:
-    spec = importlib.util.spec_from_file_location(
-        "lighthouse_sim", ROOT / "tools" / "lighthouse_sim.py"
-    )
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["lighthouse_sim"] = module  # its dataclasses look themselves up
-    spec.loader.exec_module(module)
-    return module
 
 
 def path_of(name: str) -> Path:
@@ -37,7 +23,7 @@ def path_of(name: str) -> Path:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_with_stations_given_the_errors_are_within_the_bar(tool: ModuleType, name: str) -> None:
+def test_with_stations_given_the_errors_are_within_the_bar(name: str) -> None:
     mm, degrees = BARS[name.split("_")[1]]
     s = tool.score(tool.read_set(path_of(name)), solve=False)
     assert s.mm < mm and s.degrees < degrees
@@ -46,7 +32,7 @@ def test_with_stations_given_the_errors_are_within_the_bar(tool: ModuleType, nam
 
 
 @pytest.mark.parametrize("name", ["lh1_noisy_a"])
-def test_with_stations_solved_from_the_set_itself_too(tool: ModuleType, name: str) -> None:
+def test_with_stations_solved_from_the_set_itself_too(name: str) -> None:
     mm, degrees = BARS[name.split("_")[1]]
     s = tool.score(tool.read_set(path_of(name)), solve=True)
     assert s.mm < 2 * mm and s.degrees < 2 * degrees
@@ -54,7 +40,7 @@ def test_with_stations_solved_from_the_set_itself_too(tool: ModuleType, name: st
     assert s.gravity_degrees < 0.3
 
 
-def test_the_worlds_convert_there_and_back(tool: ModuleType) -> None:
+def test_the_worlds_convert_there_and_back() -> None:
     p, R = tool.y_up_from_z_up([0.0, 0.0, 1.0])
     assert p.tolist() == [0.0, 1.0, 0.0]
     assert (R.T @ p).tolist() == [0.0, 0.0, 1.0]
