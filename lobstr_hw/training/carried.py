@@ -28,7 +28,7 @@ from lobstr_hw.training.episodes import EpisodeSource
 from lobstr_hw.training.kinematics import rotations_from_6d, toes_in_reference
 from lobstr_hw.training.streams import Chunk, Position, Streams
 
-__all__ = ["train_carried", "validate_carried"]
+__all__ = ["WholeClip", "held_out_clips", "keep_best", "train_carried", "validate_carried"]
 
 NOT_SCORED = round(RATE_HZ)
 """Frames at a clip's start, as in the metrics."""
@@ -42,17 +42,18 @@ def train_carried(
         hidden = torch.zeros(1, config.batch, config.hidden_size)
         run.carried = Carried(hidden, Position.start(config.batch))
     streams = Streams(EpisodeSource(clips, config), config, run.carried.position)
-    held_out = [] if validation is None else _held_out(validation, run, config)
+    held_out = [] if validation is None else held_out_clips(validation, run, config)
     while run.step < config.steps:
         run.curve.append(_train_step(run, streams, config))
         run.step += 1
         due = run.step % config.validate_every == 0 or run.step == config.steps
         if held_out and due:
-            _keep_best(run, [float(run.step), *validate_carried(run, held_out)])
+            keep_best(run, [float(run.step), *validate_carried(run, held_out)])
         yield run
 
 
-def _keep_best(run: Run, row: list[float]) -> None:
+def keep_best(run: Run, row: list[float]) -> None:
+    """Note a validation; the weights are kept if no earlier ones had a smaller toe error."""
     if all(row[1] < before[1] for before in run.validation):
         run.best = {name: value.clone() for name, value in run.network.state_dict().items()}
     run.validation.append(row)
@@ -89,7 +90,7 @@ def _targets(chunk: Chunk, config: TrainingConfig) -> ChunkTargets:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Clip:
+class WholeClip:
     """A validation clip: input (frames, 37) z-scored, and the truth."""
 
     folder: str
@@ -99,7 +100,8 @@ class _Clip:
     yaw: Tensor
 
 
-def _held_out(clips: Clips, run: Run, config: TrainingConfig) -> list[_Clip]:
+def held_out_clips(clips: Clips, run: Run, config: TrainingConfig) -> list[WholeClip]:
+    """Undisturbed clips as the network of a run sees them; too short ones are left out."""
     labels = clips.contact if config.contact_label == "floor" else clips.paper_contact
     out = []
     for name, a, b in zip(clips.names, clips.start[:-1], clips.start[1:], strict=True):
@@ -109,11 +111,11 @@ def _held_out(clips: Clips, run: Run, config: TrainingConfig) -> list[_Clip]:
         )
         yaw = heading_angle(reference_frames(R[:, 0]))[0].astype(np.float32)
         arrays = ((x - run.stats.input_mean) / run.stats.input_scale, clips.pose[a:b], labels[a:b])
-        out.append(_Clip(str(name).split("/")[0], *map(torch.from_numpy, (*arrays, yaw))))
+        out.append(WholeClip(str(name).split("/")[0], *map(torch.from_numpy, (*arrays, yaw))))
     return [clip for clip in out if len(clip.x) > NOT_SCORED + 1]
 
 
-def validate_carried(run: Run, clips: list[_Clip]) -> list[float]:
+def validate_carried(run: Run, clips: list[WholeClip]) -> list[float]:
     """Toe error (cm), rotation error (degrees), contact accuracy, balanced, velocity error (cm/s).
 
     The state is carried from each clip's start. Folders count alike: the mean of their means.
@@ -126,7 +128,7 @@ def validate_carried(run: Run, clips: list[_Clip]) -> list[float]:
     return torch.stack([_scores(torch.stack(t).sum(0)) for t in tables.values()]).mean(0).tolist()
 
 
-def _sums(run: Run, clip: _Clip) -> Tensor:
+def _sums(run: Run, clip: WholeClip) -> Tensor:
     """Frames; toe and rotation error; labels on, right on, off, right off; steps; velocity."""
     pose, logits, _ = run.network(clip.x[None], last_only=False)
     pose, logits = pose[0, NOT_SCORED:], logits[0, NOT_SCORED:]

@@ -17,6 +17,7 @@ from lobstr_hw.training.config import TrainingConfig
 from lobstr_hw.training.dataset import Statistics
 from lobstr_hw.training.network import LobstrNetwork
 from lobstr_hw.training.streams import Position
+from lobstr_hw.training.two_way_network import TwoWayNetwork
 
 __all__ = ["Carried", "Run", "load_checkpoint", "new_run", "save_checkpoint"]
 
@@ -47,7 +48,7 @@ class Run:
         curve: one row per step, and per validation (see ``loop.CURVE_COLUMNS``).
         validation: one row per validation.
         carried: state of the streams, in the recipe ``carried``.
-        best: weights that were best in validation, in the recipe ``carried``.
+        best: weights that were best in validation, where the recipe keeps them.
     """
 
     network: LobstrNetwork
@@ -64,7 +65,8 @@ class Run:
 def new_run(config: TrainingConfig, stats: Statistics) -> Run:
     """Fresh weights from the seed."""
     torch.manual_seed(config.seed)
-    network = LobstrNetwork(config.hidden_size, torch.from_numpy(stats.output_mean))
+    kind = TwoWayNetwork if config.recipe == "two-way" else LobstrNetwork
+    network = kind(config.hidden_size, torch.from_numpy(stats.output_mean))
     return Run(network, torch.optim.Adam(network.parameters(), lr=config.learning_rate), stats)
 
 

@@ -14,6 +14,7 @@ from lobstr_hw.training.config import TrainingConfig
 from lobstr_hw.training.dataset import Clips, Statistics, Windows, draw_windows
 from lobstr_hw.training.kinematics import rotations_from_6d, toes_in_reference
 from lobstr_hw.training.losses import Targets, losses
+from lobstr_hw.training.two_way import train_two_way
 
 __all__ = ["CURVE_COLUMNS", "VALIDATION_COLUMNS", "train", "train_step", "validate"]
 
@@ -26,7 +27,7 @@ VALIDATION_COLUMNS = (
     "balanced_accuracy",
     "velocity_cm_s",
 )
-"""The velocity only in the recipe ``carried``: windows have one frame each."""
+"""The velocity not in the recipe ``paper``: its windows have one frame each."""
 
 _VALIDATION_STREAM = 2**31
 """A step number no training step has: the validation windows are always the same."""
@@ -39,6 +40,9 @@ def train(
     torch.set_num_threads(config.threads)
     if config.recipe == "carried":
         yield from train_carried(run, clips, validation, config)
+        return
+    if config.recipe == "two-way":
+        yield from train_two_way(run, clips, validation, config)
         return
     held_out = _validation_windows(validation, config)
     while run.step < config.steps:

@@ -62,11 +62,12 @@ def _parser() -> argparse.ArgumentParser:
     start = parser.add_mutually_exclusive_group()
     start.add_argument(
         "--recipe",
-        choices=("paper", "carried"),
-        help="paper (default): windows from zero; carried: the state goes on, as in live use",
+        choices=("paper", "carried", "two-way"),
+        help="paper (default): windows from zero; carried: the state goes on, as in live use; "
+        "two-way: for recordings, the future is known too",
     )
     start.add_argument("--config", type=Path, metavar="FILE", help="a config.json to start from")
-    parser.add_argument("--steps", type=int, help="steps of one batch (1500; carried 4000)")
+    parser.add_argument("--steps", type=int, help="of one batch (1500; carried 4000; two-way 2600)")
     parser.add_argument("--seed", type=int, help="of weights, windows and errors (1)")
     parser.add_argument("--precision", choices=("fp32", "bf16"), help="of the products (fp32)")
     parser.add_argument("--cache", type=Path, metavar="DIR", help="retargeted clips (OUT/cache)")

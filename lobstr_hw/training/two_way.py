@@ -1,0 +1,116 @@
+"""Training of the network for recordings: every frame of a chunk, past and future known.
+
+The chunks are drawn, disturbed and mirrored like the episodes of the recipe ``carried``, each from
+a generator of its own: a step depends on the seed and its number only. Frames near a chunk's end
+know less than the same frames of a recording that goes on, and have no loss; some ends stand for a
+recording's own ends and are scored, for those exist too.
+"""
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from lobstr_hw.training.carried import held_out_clips, keep_best, validate_carried
+from lobstr_hw.training.carried_losses import (
+    ChunkTargets,
+    carried_losses,
+    distance,
+    toe_errors_in_world,
+)
+from lobstr_hw.training.checkpoint import Run
+from lobstr_hw.training.config import TrainingConfig, TwoWaySettings
+from lobstr_hw.training.dataset import Clips, Float32
+from lobstr_hw.training.episodes import EpisodeSource
+from lobstr_hw.training.kinematics import toes_in_reference
+
+__all__ = ["counted_frames", "planted_term", "train_two_way"]
+
+_MARGINS = 2**32 - 1
+"""In a chunk's place in the seed: the generator that says which ends are scored."""
+
+
+def train_two_way(
+    run: Run, clips: Clips, validation: Clips | None, config: TrainingConfig
+) -> Iterator[Run]:
+    """Go on until ``config.steps``, giving the run after each step; it changes in place.
+
+    Raises:
+        ValueError: an episode would be more than one chunk.
+    """
+    if config.carried.mean_chunks != 1.0:
+        raise ValueError("two-way: carried.mean_chunks has to be 1, every chunk is by itself")
+    source = EpisodeSource(clips, config)
+    held_out = [] if validation is None else held_out_clips(validation, run, config)
+    while run.step < config.steps:
+        run.curve.append(_train_step(run, source, config))
+        run.step += 1
+        due = run.step % config.validate_every == 0 or run.step == config.steps
+        if held_out and due:
+            keep_best(run, [float(run.step), *validate_carried(run, held_out)])
+        yield run
+
+
+def _train_step(run: Run, source: EpisodeSource, config: TrainingConfig) -> list[float]:
+    """One batch of chunks; returns a row of the curve."""
+    learning_rate = config.learning_rate * config.learning_rate_decay**run.step
+    for group in run.optimizer.param_groups:
+        group["lr"] = learning_rate
+    run.network.train()
+    x, truth = _batch(source, config, run.step)
+    z = torch.from_numpy((x - run.stats.input_mean) / run.stats.input_scale)
+    with _precision(config):
+        pose, logits, _ = run.network(z, last_only=False)
+    terms = carried_losses(pose, logits, truth, config.weights)
+    total = terms.total + config.two_way.planted * planted_term(pose, truth)
+    run.optimizer.zero_grad(set_to_none=True)
+    total.backward()  # type: ignore[no-untyped-call]
+    torch.nn.utils.clip_grad_norm_(run.network.parameters(), config.carried.gradient_norm)
+    run.optimizer.step()
+    values = (total, terms.pose, terms.toe, terms.velocity, terms.contact)
+    return [run.step + 1.0, *(float(v.detach()) for v in values), learning_rate]
+
+
+def _batch(
+    source: EpisodeSource, config: TrainingConfig, step: int
+) -> tuple[Float32, ChunkTargets]:
+    """Input (n, frames, 37) not yet z-scored, and the truth."""
+    seeds = ([config.seed, step, i] for i in range(config.batch))
+    chunks = [source.draw(np.random.default_rng(seed)) for seed in seeds]
+    rng = np.random.default_rng([config.seed, step, _MARGINS])
+    counted = counted_frames(config.batch, config.window, config.two_way, rng)
+    arrays = [
+        np.stack([getattr(chunk, name) for chunk in chunks]) for name in ("pose", "contact", "yaw")
+    ]
+    truth = ChunkTargets(*(torch.from_numpy(a) for a in (*arrays, counted)))
+    return np.stack([chunk.x for chunk in chunks]), truth
+
+
+def planted_term(pose: Tensor, truth: ChunkTargets) -> Tensor:
+    """Mean difference of the true and the said movements per frame of toe bases that stand.
+
+    Args:
+        pose: (n, frames, 48) as said.
+        truth: of the chunks; a foot stands where it is in contact in both frames.
+    """
+    errors = toes_in_reference(pose) - toes_in_reference(truth.pose)
+    moved = distance(torch.diff(toe_errors_in_world(errors, truth.yaw), dim=1))
+    stands = (truth.contact[:, 1:] * truth.contact[:, :-1]) * truth.counted[:, 1:, None]
+    return (moved * stands).sum() / stands.sum().clamp(min=1.0)
+
+
+def counted_frames(
+    n: int, frames: int, settings: TwoWaySettings, rng: np.random.Generator
+) -> Float32:
+    """(n, frames) 1 where there is a loss, else 0."""
+    is_end = rng.random((2, n, 1)) < settings.end_share
+    margin = np.where(is_end, settings.end_margin, settings.margin)
+    frame = np.arange(frames)
+    inside = (frame >= margin[0]) & (frames - 1 - frame >= margin[1])
+    return np.asarray(inside, dtype=np.float32)
+
+
+def _precision(config: TrainingConfig) -> AbstractContextManager[object]:
+    return torch.autocast("cpu", dtype=torch.bfloat16, enabled=config.precision == "bf16")
