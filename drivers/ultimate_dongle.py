@@ -4,8 +4,9 @@ from contextlib import suppress
 from typing import Any
 
 from lobstr_hw.drivers.ultimate_reports import DongleCommand, command_report, read_answer
+from lobstr_hw.drivers.usb_permission import device_node, may_open, no_permission
 from lobstr_hw.drivers.vendor import require_library
-from lobstr_hw.errors import DriverUnavailable, TrackerNotFound
+from lobstr_hw.errors import DeviceBusy, DriverError, DriverUnavailable, TrackerNotFound
 
 __all__ = ["Dongle"]
 
@@ -23,6 +24,7 @@ class Dongle:
 
         Raises:
             TrackerNotFound: none is plugged in.
+            DeviceBusy: another program has it.
             DriverUnavailable: hidapi or the permission is missing.
         """
         hid = _hid_library()
@@ -36,10 +38,7 @@ class Dongle:
         try:
             self._device.open_path(found[0]["path"])
         except OSError as error:
-            raise DriverUnavailable(
-                f"the dongle cannot be opened ({error}): on Linux it needs a udev rule for "
-                f"{DONGLE[0]:04x}:{DONGLE[1]:04x}; elsewhere close VIVE Hub"
-            ) from error
+            raise _refusal(found[0]["path"], error) from error
 
     def send(self, command: DongleCommand, data: bytes) -> None:
         """Send a command; OSError when the dongle is gone."""
@@ -64,6 +63,13 @@ class Dongle:
         """Let go of it; never raises."""
         with suppress(OSError):
             self._device.close()
+
+
+def _refusal(path: bytes, error: OSError) -> DriverError:
+    node = device_node(path)
+    if node is not None and not may_open(node):
+        return no_permission("the dongle of Vive Ultimate Trackers")
+    return DeviceBusy(f"the dongle cannot be opened ({error}): close VIVE Hub")
 
 
 def _hid_library() -> Any:

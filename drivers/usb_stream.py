@@ -5,10 +5,11 @@ from contextlib import suppress
 from typing import Any
 
 from lobstr_hw.drivers.reading_thread import LinkLost
+from lobstr_hw.drivers.usb_permission import no_permission
 from lobstr_hw.drivers.vendor import require_library
 from lobstr_hw.errors import DeviceBusy, DriverError, DriverUnavailable, TrackerNotFound
 
-__all__ = ["BulkLink"]
+__all__ = ["BulkLink", "libusb_backend"]
 
 READ_MS = 50
 READ_BYTES = 4096
@@ -32,7 +33,8 @@ class BulkLink:
         self._core = require_library("usb.core", "pyusb", "hid")
         try:
             device = self._core.find(
-                custom_match=lambda d: (d.idVendor, d.idProduct) in identities, backend=_libusb()
+                custom_match=lambda d: (d.idVendor, d.idProduct) in identities,
+                backend=libusb_backend(),
             )
             if device is None:
                 ids = ", ".join(f"{v:04x}:{p:04x}" for v, p in sorted(identities))
@@ -86,7 +88,7 @@ class BulkLink:
             util.dispose_resources(self._device)
 
 
-def _libusb() -> Any:
+def libusb_backend() -> Any:
     """The libusb that came with the extra, or else (None) the system's."""
     try:
         return require_library("libusb_package", "libusb-package", "hid").get_libusb1_backend()
@@ -114,7 +116,5 @@ def _translated(name: str, error: Any) -> DriverError:
     if error.errno == errno.EBUSY:
         return DeviceBusy(f"another program has the {name}: close that program")
     if error.errno == errno.EACCES:
-        return DriverUnavailable(
-            f"no permission for the {name} on USB: on Linux a udev rule, on Windows WinUSB by Zadig"
-        )
+        return no_permission(f"the {name}")
     return TrackerNotFound(f"the {name} on USB does not answer ({error}): unplug it and try again")

@@ -9,7 +9,7 @@ import zipfile
 from pathlib import Path, PurePosixPath
 
 FOLDERS = ("lobstr_hw", "calibration", "drivers", "runtime")
-SHIPPED = {".py", ".typed", ".onnx", ".json", ".mcap", ".csv", ".md"}
+SHIPPED = {".py", ".typed", ".onnx", ".json", ".mcap", ".csv", ".md", ".rules"}
 SIZE_LIMIT_MB = 25.0
 
 

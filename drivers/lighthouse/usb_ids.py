@@ -7,7 +7,7 @@ the device's configuration says which of them it is.
 from dataclasses import dataclass
 from enum import StrEnum
 
-__all__ = ["KNOWN", "VALVE", "DeviceKind", "KnownDevice", "kind_of"]
+__all__ = ["HTC", "KNOWN", "VALVE", "DeviceKind", "KnownDevice", "kind_of"]
 
 VALVE, HTC = 0x28DE, 0x0BB4
 LIGHTHOUSE_RANGE = range(0x2000, 0x2400)
