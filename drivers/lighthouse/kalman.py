@@ -53,6 +53,8 @@ class FilterSettings:
         rest_speed_sigma: m/s: how still a device at rest is.
         rest_gyro_sigma: rad/s: how well a stretch of rest gives the gyro's bias.
         rest_calm: at rest, the accelerometer's noise is this much of acc_noise: nothing shakes it.
+        between: what the IMU did between two samples is known no better than this share of how much
+            the second differs from the first: it was shaken, or samples were lost on the way.
     """
 
     hit_sigma_rad: float = 2e-4
@@ -66,6 +68,7 @@ class FilterSettings:
     rest_speed_sigma: float = 0.003
     rest_gyro_sigma: float = 0.003
     rest_calm: float = 0.1
+    between: float = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,8 +135,9 @@ def _transitions(track: Track) -> Array:
     return F
 
 
-def _noise(t: Array, settings: FilterSettings, calm: float) -> Array:
-    """Covariance (n, 15, 15) gathered in times t (n,)."""
+def _noise(track: Track, settings: FilterSettings, calm: float) -> Array:
+    """Covariance (n, 15, 15) gathered from the track's start to each of its moments."""
+    t = (track.ticks - track.ticks[0]) / TICKS_PER_S
     Q = np.zeros((len(t), ERRORS, ERRORS))
     acc, gyro = (settings.acc_noise * calm) ** 2, settings.gyro_noise**2
     i = np.arange(3)
@@ -143,16 +147,27 @@ def _noise(t: Array, settings: FilterSettings, calm: float) -> Array:
     Q[:, i + 6, i + 6] = gyro * t[:, None]
     Q[:, i + 9, i + 9] = settings.gyro_bias_walk**2 * t[:, None]
     Q[:, i + 12, i + 12] = settings.acc_bias_walk**2 * t[:, None]
+    sped, turned = _unseen(track.a, t, settings.between), _unseen(track.gyro, t, settings.between)
+    Q[:, i, i] += sped * t[:, None] ** 2 / 3.0
+    Q[:, i, i + 3] += 0.5 * sped * t[:, None]
+    Q[:, i + 3, i] += 0.5 * sped * t[:, None]
+    Q[:, i + 3, i + 3] += sped
+    Q[:, i + 6, i + 6] += turned
     return Q
+
+
+def _unseen(rate: Array, t: Array, share: float) -> Array:
+    """Variance (n, 1) of the integral of a rate (n, 3) for what it did between its samples."""
+    off = share * np.linalg.norm(np.diff(rate, axis=0), axis=1) * np.diff(t)
+    return np.concatenate([[0.0], np.cumsum(off**2)])[:, None] / 3.0
 
 
 def covariances(state: FilterState, track: Track, settings: FilterSettings, calm: float) -> Array:
     """Covariance (n, 6, 6) of position and rotation at every moment of a track."""
     keep = np.r_[0:3, 6:9]
     F = _transitions(track)[:, keep]
-    t = (track.ticks - track.ticks[0]) / TICKS_PER_S
     P = F @ state.P @ np.swapaxes(F, 1, 2)
-    return np.asarray(P + _noise(t, settings, calm)[:, keep[:, None], keep])
+    return np.asarray(P + _noise(track, settings, calm)[:, keep[:, None], keep])
 
 
 def advance(
@@ -160,8 +175,7 @@ def advance(
 ) -> FilterState:
     """The state at a track's end, from the IMU alone."""
     F = _transitions(track)[-1]
-    t = (track.ticks[-1:] - track.ticks[0]) / TICKS_PER_S
-    P = F @ state.P @ F.T + _noise(t, settings, calm)[0]
+    P = F @ state.P @ F.T + _noise(track, settings, calm)[-1]
     return replace(
         state, ticks=int(track.ticks[-1]), p=track.p[-1], v=track.v[-1], R=track.R[-1], P=P
     )
