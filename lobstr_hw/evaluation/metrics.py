@@ -4,9 +4,10 @@ Contact accuracy: share of frames and feet with the right label. Balanced accura
 recalls. Rotation error: mean geodesic angle over C, U, L, F of both sides; legs-only without C.
 Position error: of the toe bases, the truth's root and heading given. Velocity error: mean norm of
 the difference of the toe bases' velocities. Skate: horizontal toe-base speed while the truth is in
-contact. Jitter ratio: mean norm of the third difference of the toe bases over the truth's.
-Penetration: mean depth of the lowest of heel, toe base and tip under the floor. Lengths are of the
-standard skeleton (hips at 1.0 m).
+contact; held skate: the same while the scored legs say themselves that the foot stands, in this
+frame and the one before (after IK: while the lock is closed). Jitter ratio: mean norm of the third
+difference of the toe bases over the truth's. Penetration: mean depth of the lowest of heel, toe
+base and tip under the floor. Lengths are of the standard skeleton (hips at 1.0 m).
 """
 
 from dataclasses import dataclass, fields
@@ -68,6 +69,8 @@ class Tally:
     skate_steps: int = 0
     skate_m_s: float = 0.0
     truth_skate_m_s: float = 0.0
+    held_steps: int = 0
+    held_skate_m_s: float = 0.0
     jitter: float = 0.0
     truth_jitter: float = 0.0
 
@@ -91,6 +94,7 @@ class Tally:
             "position_error_cm": _ratio(100.0 * self.position_m, feet),
             "skate_cm_s": _ratio(100.0 * self.skate_m_s, self.skate_steps),
             "truth_skate_cm_s": _ratio(100.0 * self.truth_skate_m_s, self.skate_steps),
+            "held_skate_cm_s": _ratio(100.0 * self.held_skate_m_s, self.held_steps),
             "velocity_error_cm_s": _ratio(100.0 * self.velocity_m_s, 2 * self.steps),
             "jitter_ratio": _ratio(self.jitter, self.truth_jitter),
             "penetration_cm": _ratio(100.0 * self.penetration_m, feet),
@@ -113,7 +117,7 @@ def tally(truth: Truth, legs: Legs) -> Tally:
     said, true_contact = legs.contact[scored], truth.contact[scored]
     right = said == true_contact
     v, true_v = np.diff(toes, axis=0) * truth.rate_hz, np.diff(true_toes, axis=0) * truth.rate_hz
-    standing = true_contact[1:]
+    standing, held = true_contact[1:], said[1:] & said[:-1]
     return Tally(
         frames=len(toes),
         true_on=int(true_contact.sum()),
@@ -130,6 +134,8 @@ def tally(truth: Truth, legs: Legs) -> Tally:
         skate_steps=int(standing.sum()),
         skate_m_s=float(_horizontal_speed(v)[standing].sum()),
         truth_skate_m_s=float(_horizontal_speed(true_v)[standing].sum()),
+        held_steps=int(held.sum()),
+        held_skate_m_s=float(_horizontal_speed(v)[held].sum()),
         jitter=_jitter(toes),
         truth_jitter=_jitter(true_toes),
     )

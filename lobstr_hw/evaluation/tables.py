@@ -16,9 +16,11 @@ COLUMNS = {
     "rotation_error_deg": ("rotation °", 1.0),
     "rotation_error_legs_deg": ("legs °", 1.0),
     "position_error_cm": ("toes cm", 1.0),
+    "position_cost": ("toes + %", 100.0),
     "velocity_error_cm_s": ("velocity cm/s", 1.0),
     "skate_cm_s": ("skate cm/s", 1.0),
     "truth_skate_cm_s": ("true skate", 1.0),
+    "held_skate_cm_s": ("held skate", 1.0),
     "jitter_ratio": ("jitter", 1.0),
     "penetration_cm": ("under floor cm", 1.0),
 }
@@ -38,6 +40,14 @@ class ClipResult:
         """The set of the clip."""
         return clip_name(self.name).split("/")[0]
 
+    def scores(self) -> dict[str, Scores]:
+        """Of both; ``position_cost`` is the share of toe error that lock, floor and IK add."""
+        before, after = self.network.scores(), self.after_ik.scores()
+        return {
+            "network": {**before, "position_cost": None},
+            "after_ik": {**after, "position_cost": _added(before, after)},
+        }
+
 
 def total(results: Sequence[ClipResult]) -> ClipResult:
     """Of all clips together: each frame counts the same."""
@@ -52,21 +62,22 @@ def document(results: Sequence[ClipResult]) -> dict[str, Any]:
     """``{"all": {"network": ..., "after_ik": ...}, "folders": {...}, "clips": {...}}``."""
     folders = sorted({r.folder for r in results})
     return {
-        "all": _pair(total(results)),
-        "folders": {f: _pair(total([r for r in results if r.folder == f])) for f in folders},
-        "clips": {r.name: _pair(r) for r in results},
+        "all": total(results).scores(),
+        "folders": {f: total([r for r in results if r.folder == f]).scores() for f in folders},
+        "clips": {r.name: r.scores() for r in results},
     }
 
 
-def _pair(result: ClipResult) -> dict[str, Scores]:
-    return {"network": result.network.scores(), "after_ik": result.after_ik.scores()}
+def _added(before: Scores, after: Scores) -> float | None:
+    was, now = before["position_error_cm"], after["position_error_cm"]
+    return now / was - 1.0 if now is not None and was else None
 
 
 def markdown_row(label: str, scores: Mapping[str, float | int | None]) -> str:
     """One line of the table."""
     cells = []
     for key, (_, factor) in COLUMNS.items():
-        value = scores[key]
+        value = scores.get(key)
         cells.append("-" if value is None else f"{factor * value:.2f}")
     return f"| {label} | " + " | ".join(cells) + " |"
 

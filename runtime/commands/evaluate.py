@@ -159,9 +159,9 @@ def _table(
             rows.append((name, _score(name, load_predictor(name), clips, "carried", stop)))
     lines = []
     for label, clip_results in rows:
-        whole = total(clip_results)
-        lines.append((f"{label}, network", whole.network.scores()))
-        lines.append((f"{label}, after IK", whole.after_ik.scores()))
+        whole = total(clip_results).scores()
+        lines.append((f"{label}, network", whole["network"]))
+        lines.append((f"{label}, after IK", whole["after_ik"]))
     frames = total(results).network.frames
     head = f"{len(clips)} clips, {frames} frames scored ({frames / 45.0 / 60.0:.1f} minutes)"
     return f"{head}\n\n{markdown_table(lines)}"

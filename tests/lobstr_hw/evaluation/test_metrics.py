@@ -81,6 +81,32 @@ def test_skate_is_horizontal_and_only_while_the_truth_stands() -> None:
     assert tally(nobody_stands, legs).scores()["skate_cm_s"] is None
 
 
+def test_held_skate_is_counted_while_the_legs_themselves_say_that_they_stand(truth: Truth) -> None:
+    slide = np.zeros(truth.p_toes.shape)
+    slide[..., 0] = 0.1 * np.arange(len(truth))[:, None] / truth.rate_hz
+    still = replace(perfect(truth), p_toes=0.0 * truth.p_toes)
+    sliding = replace(still, p_toes=slide)
+    assert tally(truth, still).scores()["held_skate_cm_s"] == 0.0
+    assert tally(truth, sliding).scores()["held_skate_cm_s"] == pytest.approx(10.0)
+    nobody = replace(sliding, contact=np.zeros_like(truth.contact))
+    assert tally(truth, nobody).scores()["held_skate_cm_s"] is None
+    # the frame in which a foot lands, or leaves, is no held one
+    landing = replace(nobody, contact=np.tile([[True], [False]], (len(truth) // 2 + 1, 2)))
+    landing = replace(landing, contact=landing.contact[: len(truth)])
+    assert tally(truth, landing).scores()["held_skate_cm_s"] is None
+
+
+def test_the_cost_of_the_lock_is_the_share_of_toe_error_that_it_adds(truth: Truth) -> None:
+    near, far = (
+        tally(truth, replace(perfect(truth), p_toes=truth.p_toes + np.array([x, 0.0, 0.0])))
+        for x in (0.08, 0.10)
+    )
+    scores = ClipResult("a/x", near, far).scores()
+    assert scores["after_ik"]["position_cost"] == pytest.approx(0.25)
+    assert scores["network"]["position_cost"] is None
+    assert ClipResult("a/x", Tally(), Tally()).scores()["after_ik"]["position_cost"] is None
+
+
 def test_a_turned_joint_counts_an_eighth_and_a_sixth(truth: Truth) -> None:
     joints = truth.joints.copy()
     joints[:, 0, 2] = joints[:, 0, 2] @ rotation_x(np.deg2rad(24.0))
