@@ -11,16 +11,16 @@
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from lobstr_hw.drivers.lighthouse.angles import StationCalibration
 from lobstr_hw.drivers.lighthouse.bundle import bundle
-from lobstr_hw.drivers.lighthouse.light import Hits, Station, Stations
+from lobstr_hw.drivers.lighthouse.light import Station, Stations
 from lobstr_hw.drivers.lighthouse.refine import Guess, rms_rad
 from lobstr_hw.drivers.lighthouse.station_map import first_guess, first_map
-from lobstr_hw.drivers.lighthouse.station_views import Take, View, find_views, hits_at
+from lobstr_hw.drivers.lighthouse.station_views import Take, View, find_views, hits_of
 from lobstr_hw.drivers.lighthouse.up import measure_up
 from lobstr_hw.errors import StationsNotSolved
 from lobstr_hw.poses import Pose
@@ -79,14 +79,12 @@ def solve_stations(
     seen = [n for v in views for n in v.T_station_imu]
     rough = first_map(views, calibrations)
     views, guesses = _fitting(views, rough)
-    stations, guesses, residual = bundle(
-        rough, [_hits(takes, v) for v in views], guesses, evaluations
-    )
+    stations, guesses, residual = bundle(rough, [v.hits for v in views], guesses, evaluations)
     upright = measure_up(takes, views, guesses, stations)
     for _ in range(REPEATS):
         # once more, now that it is known how the devices moved around each view
         level = rotation_between(upright.up, np.array([0.0, 1.0, 0.0]))
-        hits = [_hits(takes, v, level @ g.R) for v, g in zip(views, guesses, strict=True)]
+        hits = [hits_of(takes[v.take], v, level @ g.R) for v, g in zip(views, guesses, strict=True)]
         stations, guesses, residual = bundle(stations, hits, guesses, evaluations, upright.v)
         upright = measure_up(takes, views, guesses, stations)
     return StationSolution(
@@ -107,9 +105,9 @@ def _fitting(views: Sequence[View], rough: Stations) -> tuple[list[View], list[G
         guess = first_guess(view, rough)
         if guess is None:
             continue
-        hits = view.hits.select(np.isin(view.hits.station, list(known)))
-        if rms_rad(rough, hits, guess) < MISFIT_RAD:
-            kept.append(replace(view, hits=hits))
+        there = view.select(np.isin(view.hits.station, list(known)))
+        if rms_rad(rough, there.hits, guess) < MISFIT_RAD:
+            kept.append(there)
             guesses.append(guess)
     if len(kept) < VIEWS_AT_LEAST:
         raise StationsNotSolved(
@@ -117,13 +115,6 @@ def _fitting(views: Sequence[View], rough: Stations) -> tuple[list[View], list[G
             " Carry a tracker slowly through the room again."
         )
     return kept, guesses
-
-
-def _hits(takes: Sequence[Take], view: View, R: Array | None = None) -> Hits:
-    if R is None:
-        return view.hits
-    hits = hits_at(takes[view.take], view.ticks, np.unique(view.hits.station).tolist(), R)
-    return view.hits if hits is None else hits
 
 
 def _placed(stations: Stations, guesses: Sequence[Guess], up: Array) -> dict[int, Station]:

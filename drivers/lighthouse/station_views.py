@@ -1,7 +1,7 @@
 """Moments at which a device is seen, and how it lies to each station then: where a solve begins."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,18 +14,23 @@ from lobstr_hw.drivers.lighthouse.angles import (
     StationCalibration,
 )
 from lobstr_hw.drivers.lighthouse.inertial import gather
-from lobstr_hw.drivers.lighthouse.light import Hits, Station, take_angles
+from lobstr_hw.drivers.lighthouse.light import Flags, Hits, Station, take_angles
 from lobstr_hw.drivers.lighthouse.pose_seed import seed
-from lobstr_hw.drivers.lighthouse.refine import rms_rad
+from lobstr_hw.drivers.lighthouse.refine import residuals
 from lobstr_hw.poses import Pose
 from lobstr_hw.rotations import Array
 
-__all__ = ["Take", "View", "find_views", "hits_at"]
+__all__ = ["Take", "View", "find_views", "hits_of"]
 
+ZERO = np.zeros(3)
+HITS_AT_LEAST = 8
 AROUND_S = 0.02
 """Hits so far from the moment belong to it: a turn of the rotors each way."""
 FIT_RAD = 1e-3
 """A view whose hits fit worse is a wrong one."""
+OUTLIER, OUTLIER_RAD, TRUE_AT_LEAST = 6.0, 1e-3, 0.7
+"""Hits so many times further off than the middle one, and so far, are reflections: a device that
+lies still sees the same one all the time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,16 +49,23 @@ class View:
     Attributes:
         take: which of the takes.
         ticks: the moment, on the device's clock.
-        hits: around it, of all the stations below.
+        angles: around it, of all the stations below, without reflections.
+        hits: the same, as they lie at the moment.
         T_station_imu: the device in each station's frame, by the station's number.
         fit_rad: how well each of them fits.
     """
 
     take: int
     ticks: int
+    angles: Angles
     hits: Hits
     T_station_imu: Mapping[int, Pose]
     fit_rad: Mapping[int, float]
+
+    def select(self, which: Flags) -> "View":
+        """With those hits only."""
+        angles, hits = take_angles(self.angles, which), self.hits.select(which)
+        return replace(self, angles=angles, hits=hits)
 
 
 def find_views(
@@ -92,34 +104,47 @@ def _moments(take: Take, spacing_s: float) -> Ints:
     return np.arange(first, last, int(spacing_s * TICKS_PER_S))
 
 
-def hits_at(take: Take, ticks: int, stations: Sequence[int], R: Array | None = None) -> Hits | None:
-    """A take's hits around a moment; None: too few. ``R``: as in :func:`gather`."""
-    around = int(AROUND_S * TICKS_PER_S)
-    i, j = np.searchsorted(take.angles.ticks, [ticks - around, ticks + around])
-    angles = take_angles(take.angles, slice(int(i), int(j)))
-    angles = take_angles(angles, np.isin(angles.station, stations))
-    k, n = np.searchsorted(take.imu.ticks, [ticks - 2 * around, ticks + 2 * around])
-    if len(angles) < 8 or n - k < 2:
-        return None
-    imu = ImuSamples(take.imu.ticks[k:n], take.imu.acc_g[k:n], take.imu.gyro_rad_s[k:n])
-    return gather(take.model, angles, imu, ticks, np.zeros(3), R)
+def hits_of(take: Take, view: View, R: Array) -> Hits:
+    """A view's hits again, now that the device's rotation is known: as in :func:`gather`."""
+    return gather(take.model, view.angles, _imu_around(take, view.ticks), view.ticks, ZERO, R)
+
+
+def _imu_around(take: Take, ticks: int) -> ImuSamples:
+    around = int(2 * AROUND_S * TICKS_PER_S)
+    k, n = np.searchsorted(take.imu.ticks, [ticks - around, ticks + around])
+    return ImuSamples(take.imu.ticks[k:n], take.imu.acc_g[k:n], take.imu.gyro_rad_s[k:n])
 
 
 def _view(
     number: int, take: Take, ticks: int, calibrations: Mapping[int, StationCalibration]
 ) -> View | None:
-    hits = hits_at(take, ticks, list(calibrations))
-    if hits is None:
+    around = int(AROUND_S * TICKS_PER_S)
+    i, j = np.searchsorted(take.angles.ticks, [ticks - around, ticks + around])
+    angles = take_angles(take.angles, slice(int(i), int(j)))
+    angles = take_angles(angles, np.isin(angles.station, list(calibrations)))
+    imu = _imu_around(take, ticks)
+    if len(angles) < HITS_AT_LEAST or len(imu) < 2:
         return None
-    poses, fits = {}, {}
-    for station in np.unique(hits.station):
-        mine = hits.select(hits.station == station)
-        if len(np.unique(mine.axis)) < 2:
-            continue
-        alone = {int(station): Station(calibrations[int(station)], Pose.identity())}
-        fit = seed(alone, mine)
-        if fit is not None and (rms := rms_rad(alone, mine, fit.guess)) < FIT_RAD:
-            poses[int(station)] = Pose(fit.guess.R, fit.guess.p)
-            fits[int(station)] = rms
-    hits = hits.select(np.isin(hits.station, list(poses)))
-    return View(number, ticks, hits, poses, fits) if poses else None
+    hits = gather(take.model, angles, imu, ticks, ZERO)
+    poses, fits, true = {}, {}, np.zeros(len(hits), dtype=np.bool_)
+    for station in np.unique(hits.station).tolist():
+        mine = hits.station == station
+        found = _alone(Station(calibrations[station], Pose.identity()), hits.select(mine))
+        if found is not None:
+            poses[station], fits[station], good = found
+            true[mine] = good
+    return View(number, ticks, angles, hits, poses, fits).select(true) if poses else None
+
+
+def _alone(station: Station, hits: Hits) -> tuple[Pose, float, Flags] | None:
+    """The device in a station's frame by its own hits, how well they fit, which were true."""
+    number = int(hits.station[0])
+    fit = seed({number: station}, hits) if len(np.unique(hits.axis)) == 2 else None
+    if fit is None:
+        return None
+    error = np.abs(residuals({number: station}, hits, fit.guess)[0])
+    true = error < max(OUTLIER * float(np.median(error)), OUTLIER_RAD)
+    rms = float(np.sqrt(np.mean(error[true] ** 2)))
+    if rms > FIT_RAD or np.mean(true) < TRUE_AT_LEAST:
+        return None
+    return Pose(fit.guess.R, fit.guess.p), rms, true
