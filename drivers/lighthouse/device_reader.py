@@ -58,6 +58,11 @@ class DeviceReader:
         self.unreadable = 0
         self._lists = EventLists()
 
+    @property
+    def newest_tick(self) -> int | None:
+        """The device's time: that of the newest IMU sample, or None before the first."""
+        return self._ticks.newest
+
     def feed(self, data: bytes) -> None:
         """One input report; what is no report of such a device is left alone."""
         match parse_report(data):

@@ -1,6 +1,6 @@
 """A made-up room: base stations, a device that moves as told, and what it measures of them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -133,6 +133,12 @@ def imu_of(
     )
 
 
+def turn_starts(generation: int, number: int, period: int, seconds: float) -> Ints:
+    """Ticks after the beginning at which those turns of a station begin in which it sweeps."""
+    starts = np.arange(0, int(seconds * TICKS_PER_S) - period, period)
+    return np.asarray(starts + number * (TURN_TICKS[1] if generation == 1 else 311_000))
+
+
 def light_of(
     stations: dict[int, Station],
     model: DeviceModel,
@@ -141,18 +147,22 @@ def light_of(
     noise_rad: float = 0.0,
     seed: int = 0,
     first_tick: int = 1_000_000,
+    turns: Sequence[int] | None = None,
 ) -> Angles:
-    """Every hit of every sensor that looks at a station."""
+    """Every hit of every sensor that looks at a station.
+
+    ``turns``: how long those of Gen2 stations last, by number, so that angles and times agree.
+    """
     random = np.random.default_rng(seed)
     parts = []
     for number, station in stations.items():
         generation = station.calibration.generation
-        period = TURN_TICKS[generation] * (len(stations) if generation == 1 else 1)
-        period += 0 if generation == 1 else -7_000 * number
-        starts = np.arange(0, int(seconds * TICKS_PER_S) - period, period)
-        starts = starts + number * (TURN_TICKS[1] if generation == 1 else 311_000)
+        turn = turns[number] if turns else TURN_TICKS[generation]
+        period = turn * (len(stations) if generation == 1 else 1)
+        period += 0 if generation == 1 or turns else -7_000 * number
+        starts = turn_starts(generation, number, period, seconds)
         for axis in (0, 1):
-            parts.append(_sweeps(station, number, axis, starts, model, motion, first_tick))
+            parts.append(_sweeps(station, number, axis, starts, model, motion, first_tick, turn))
     angles = join_angles([p for p in parts if len(p)])
     noisy = angles.angle_rad + random.normal(scale=noise_rad, size=len(angles))
     inside = angles.ticks < first_tick + int(seconds * TICKS_PER_S)
@@ -170,6 +180,7 @@ def _sweeps(
     model: DeviceModel,
     motion: Motion,
     first_tick: int,
+    turn: int,
 ) -> Angles:
     n, s = len(starts), len(model.points)
     sensor = np.tile(np.arange(s), n)
@@ -182,7 +193,7 @@ def _sweeps(
         at = motion.p(t) + np.einsum("mij,mj->mi", R, model.points[sensor])
         normal = np.einsum("mij,mj->mi", R, model.normals[sensor])
         angle, _, _ = look({number: station}, where, np.full(n * s, axis), at, normal)
-        ticks = start + _delay(station.calibration.generation, axis, angle)
+        ticks = start + _delay(station.calibration.generation, axis, angle, turn)
     toward = station.T_world_station.p - at
     ahead = np.einsum("mi,i->m", -toward, -station.T_world_station.R[:, 2])
     seen = (np.einsum("mi,mi->m", normal, toward) > 0.0) & (ahead > 0.3)
@@ -192,11 +203,11 @@ def _sweeps(
     )
 
 
-def _delay(generation: int, axis: int, angle: Array) -> Ints:
+def _delay(generation: int, axis: int, angle: Array, turn: int) -> Ints:
     if generation == 1:
         ticks = axis * 400_000 + (angle + np.pi / 2.0) * 400_000 / np.pi
     else:
-        ticks = (angle + (axis + 1) * 2.0 * np.pi / 3.0) * TURN_TICKS[2] / (2.0 * np.pi)
+        ticks = (angle + (axis + 1) * 2.0 * np.pi / 3.0) * turn / (2.0 * np.pi)
     return np.asarray(ticks).astype(np.int64)
 
 
