@@ -6,8 +6,10 @@ One definition, called by training (windows of clips) and by the runtime (one st
     omega = R_ref^T (R_i R_{i-1}^T) R_ref       as 6D
     x_i   = [v, omega] x 4, then the height of the hips above the floor    -> 37
 
-omega depends neither on the heading nor on how a device is mounted. The form ``paper`` is what
-Yang et al. 2021 print in appendix 1; it is kept for tables.
+omega depends neither on the heading nor on how a device is mounted. The other forms are kept for
+tables: ``paper`` is what Yang et al. 2021 print in appendix 1; ``position`` (section 4.1.3) has the
+pelvis' velocity as printed, but place and rotation of the other points in the reference frame;
+``combined`` has both, 64 numbers. They are scaled as the paper does it: nothing but the height.
 """
 
 from dataclasses import dataclass
@@ -30,6 +32,7 @@ __all__ = [
     "clip_features",
     "clip_points",
     "features",
+    "input_size",
     "mirror_features",
     "reference_frame",
     "reference_frames",
@@ -38,7 +41,7 @@ __all__ = [
 FEATURE_VERSION = 1
 """Frozen with the skeleton: another version means other weights."""
 
-Form = Literal["v1", "paper"]
+Form = Literal["v1", "paper", "position", "combined"]
 Bools = npt.NDArray[np.bool_]
 
 POINT_ROLES = (
@@ -51,7 +54,8 @@ POINT_ROLES = (
 
 POINT_JOINTS: tuple[Joint, ...] = tuple(ROLE_JOINT[role] for role in POINT_ROLES)
 INPUT_SIZE = 9 * len(POINT_ROLES) + 1
-_MIRRORED_ROWS = (0, 1, 3, 2)
+_MIRRORED_ROWS = (0, 1, 3, 2, 4, 6, 5)
+"""Of the four velocities, then of the places of head and hands where a form has both."""
 _IDENTITY_6D = to_6d(np.eye(3))
 
 
@@ -84,6 +88,11 @@ class Points:
         )
 
 
+def input_size(form: Form) -> int:
+    """Numbers of the input in a form."""
+    return INPUT_SIZE + 9 * (len(POINT_ROLES) - 1) if form == "combined" else INPUT_SIZE
+
+
 def reference_frame(
     R_hips: Array, last: Array | None = None, keep: Bools | None = None, form: Form = "v1"
 ) -> Array:
@@ -93,7 +102,8 @@ def reference_frame(
         R_hips: (..., 3, 3) in the world.
         last: (..., 3, 3) the reference frame of the step before.
         keep: (...) where ``last`` means something and is kept while the pelvis has no heading.
-        form: ``paper`` projects the pelvis' Z on the floor; it flips when bowing beyond 90 degrees.
+        form: all but ``v1`` project the pelvis' Z on the floor; it flips when bowing beyond 90
+            degrees.
     """
     yaw, certainty = _yaw(R_hips, form)
     R_ref = rotation_y(yaw)
@@ -126,14 +136,14 @@ def features(
     form: Form = "v1",
     scale: Array | float = 1.0,
 ) -> Array:
-    """The network's input of one step (..., 37).
+    """The network's input of one step (..., 37 or what :func:`input_size` says).
 
     Args:
         before: the points one grid step ago.
         now: the points now.
         linked: (...) whether ``before`` is one step ago; False in the first frame and after a gap.
-        form: ``v1`` or ``paper``.
-        scale: (...) the user's scale s; for ``paper`` only, which scales nothing but the height.
+        form: see the top of the page.
+        scale: (...) the user's scale s; for all but ``v1``, which scale nothing but the height.
     """
     if form == "v1":
         v, omega = _world_deltas(before, now)
@@ -145,8 +155,22 @@ def features(
     v = np.where(same_p[..., None], v, 0.0)
     omega_6d = np.where(same_R[..., None], to_6d(omega), _IDENTITY_6D)
     rows = np.concatenate([v, omega_6d], axis=-1)  # (..., 4, 9)
+    if form in ("position", "combined"):
+        kept = rows if form == "combined" else rows[..., :1, :]
+        rows = np.concatenate([kept, _places(now, scale)], axis=-2)
     height = now.p[..., 0, 1:2]
-    return np.concatenate([rows.reshape(*rows.shape[:-2], INPUT_SIZE - 1), height], axis=-1)
+    return np.concatenate([_flat(rows), height], axis=-1)
+
+
+def _flat(rows: Array) -> Array:
+    return rows.reshape(*rows.shape[:-2], 9 * rows.shape[-2])
+
+
+def _places(now: Points, scale: Array | float) -> Array:
+    """Place and rotation (..., 3, 9) of head and hands in the reference frame."""
+    p, R = _in_reference(now)
+    p = p / np.asarray(scale)[..., None, None]
+    return np.concatenate([p, to_6d(R)], axis=-1)[..., 1:, :]
 
 
 def _world_deltas(before: Points, now: Points) -> tuple[Array, Array]:
@@ -193,7 +217,7 @@ def clip_points(
 
 
 def clip_features(points: Points, form: Form = "v1", scale: Array | float = 1.0) -> Array:
-    """:func:`features` of each frame of a clip: (frames, ..., 37)."""
+    """:func:`features` of each frame of a clip: (frames, ..., 37 or more)."""
     frame = np.arange(len(points.p))
     linked = np.broadcast_to(
         (frame > 0).reshape(-1, *(1,) * (points.p.ndim - 3)), points.p.shape[:-2]
@@ -202,7 +226,8 @@ def clip_features(points: Points, form: Form = "v1", scale: Array | float = 1.0)
 
 
 def mirror_features(x: Array) -> Array:
-    """The input of the same motion with left and right exchanged (form ``v1``)."""
-    rows = x[..., :-1].reshape(*x.shape[:-1], len(POINT_ROLES), 9)[..., _MIRRORED_ROWS, :].copy()
-    rows[..., ::3] *= -1.0  # the x of v, of the Z axis and of the Y axis
-    return np.concatenate([rows.reshape(*x.shape[:-1], INPUT_SIZE - 1), x[..., -1:]], axis=-1)
+    """The input (of any form) of the same motion with left and right exchanged."""
+    order = _MIRRORED_ROWS[: x.shape[-1] // 9]
+    rows = x[..., :-1].reshape(*x.shape[:-1], len(order), 9)[..., order, :].copy()
+    rows[..., ::3] *= -1.0  # the x of v (or p), of the Z axis and of the Y axis
+    return np.concatenate([_flat(rows), x[..., -1:]], axis=-1)

@@ -1,6 +1,7 @@
 """Weights on disk: NAME.onnx beside its card NAME.json. Never a pickle.
 
-The graph is one step of the network: x (n, 37), h (n, H) -> h', pose (n, 48), contact (n, 4).
+The graph is one step of the network: x (n, 37), h (n, H) -> h', pose (n, 48), contact (n, 4); an
+LSTM's h holds its cells too, and the feature forms of tables may have another input size.
 Whatever else a step needs (mean, scale, joint order, versions) is on the card. A file that
 disagrees with the code is refused with the reason.
 """
@@ -8,22 +9,32 @@ disagrees with the code is refused with the reason.
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 import numpy.typing as npt
 import onnxruntime
 
 from lobstr_hw.errors import ModelError
-from lobstr_hw.features import FEATURE_VERSION, INPUT_SIZE, Form
+from lobstr_hw.features import FEATURE_VERSION, Form, input_size
 from lobstr_hw.lower_body import JOINT_ORDER, POSE_SIZE
 from lobstr_hw.predictors.predictor import ModelCard
 from lobstr_hw.skeleton import SKELETON_VERSION, Joint
 from lobstr_hw.trackers import TrackerRole
 
-__all__ = ["CARD_FORMAT", "Network", "NetworkCard", "load_network", "read_card", "write_card"]
+__all__ = [
+    "CARD_FORMAT",
+    "Kind",
+    "Network",
+    "NetworkCard",
+    "load_network",
+    "open_session",
+    "read_card",
+    "write_card",
+]
 
 CARD_FORMAT = 1
+Kind = Literal["live", "recording"]
 Float32 = npt.NDArray[np.float32]
 
 _CURE = "Use weights made by this version (lobstr-train --export DIR OUT), or the shipped 'lobstr'."
@@ -36,11 +47,12 @@ class NetworkCard:
     Attributes:
         model: what any predictor tells of itself.
         feature_form: of :mod:`lobstr_hw.features`.
-        hidden_size: of the GRU.
+        hidden_size: of the state that goes from step to step.
         input_mean, input_scale: (37,) z-scoring of the input.
         output_mean: (48,) mean pose of the training data; the graph has it in its bias.
         contact_mean: (2,) share of the training frames in contact.
         joint_order: of the 48 outputs.
+        kind: ``live`` is one step of the cell; ``recording`` needs the frames after it too.
     """
 
     model: ModelCard
@@ -51,6 +63,7 @@ class NetworkCard:
     output_mean: Float32
     contact_mean: Float32
     joint_order: tuple[str, ...] = JOINT_ORDER
+    kind: Kind = "live"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +84,7 @@ def write_card(path: Path, card: NetworkCard) -> None:
     model = card.model
     document = {
         "format": CARD_FORMAT,
+        "kind": card.kind,
         "name": model.name,
         "version": model.version,
         "rate_hz": model.rate_hz,
@@ -107,15 +121,17 @@ def read_card(path: Path) -> NetworkCard:
     document = _read_json(path)
     _check_versions(path, document)
     try:
+        form = _form(document["feature_form"])
         return NetworkCard(
             model=_model_card(document),
-            feature_form=_form(document["feature_form"]),
+            feature_form=form,
             hidden_size=int(document["hidden_size"]),
-            input_mean=_array(document, "input_mean", INPUT_SIZE),
-            input_scale=_array(document, "input_scale", INPUT_SIZE),
+            input_mean=_array(document, "input_mean", input_size(form)),
+            input_scale=_array(document, "input_scale", input_size(form)),
             output_mean=_array(document, "output_mean", POSE_SIZE),
             contact_mean=_array(document, "contact_mean", 2),
             joint_order=tuple(document["joint_order"]),
+            kind=_kind(document.get("kind", "live")),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise ModelError(f"{path}: the card is damaged ({error!r}). {_CURE}") from error
@@ -141,7 +157,7 @@ def _check_versions(path: Path, document: dict[str, Any]) -> None:
         "format": CARD_FORMAT,
         "feature_version": FEATURE_VERSION,
         "skeleton_version": SKELETON_VERSION,
-        "input_size": INPUT_SIZE,
+        "input_size": input_size(document.get("feature_form", "v1")),
         "joint_order": list(JOINT_ORDER),
     }
     for key, value in expected.items():
@@ -168,11 +184,15 @@ def _model_card(document: dict[str, Any]) -> ModelCard:
 
 
 def _form(name: str) -> Form:
-    if name == "v1":
-        return "v1"
-    if name == "paper":
-        return "paper"
-    raise ValueError(f"feature_form {name!r} is neither v1 nor paper")
+    if name not in get_args(Form):
+        raise ValueError(f"feature_form {name!r} is none of {', '.join(get_args(Form))}")
+    return cast(Form, name)
+
+
+def _kind(name: str) -> Kind:
+    if name not in get_args(Kind):
+        raise ValueError(f"kind {name!r} is none of {', '.join(get_args(Kind))}")
+    return cast(Kind, name)
 
 
 def _array(document: dict[str, Any], key: str, size: int) -> Float32:
@@ -195,16 +215,33 @@ def load_network(path: Path, threads: int = 1) -> Network:
     if not path.is_file():
         raise ModelError(f"{path}: no such weights file. Weights are NAME.onnx beside NAME.json.")
     card = read_card(path.with_suffix(".json"))
-    session = _open_session(path, threads)
-    sizes = {node.name: node.shape[-1] for node in (*session.get_inputs(), *session.get_outputs())}
-    hidden = card.hidden_size
-    expected = {"x": INPUT_SIZE, "h": hidden, "h_next": hidden, "pose": POSE_SIZE, "contact": 4}
-    if sizes != expected:
-        raise ModelError(f"{path}: the graph has {sizes}, the card needs {expected}. {_CURE}")
+    if card.kind != "live":
+        raise ModelError(
+            f"{path}: this network is for recordings, it has to know what comes next. Take it "
+            "with lobstr-log export LOG --bvh OUT --refine; live: --predictor lobstr."
+        )
+    inputs, hidden = len(card.input_mean), card.hidden_size
+    state = {"h": hidden, "h_next": hidden}
+    session = open_session(path, {"x": inputs, **state, "pose": POSE_SIZE, "contact": 4}, threads)
     return Network(card, session)
 
 
-def _open_session(path: Path, threads: int) -> onnxruntime.InferenceSession:
+def open_session(
+    path: Path, expected: dict[str, int], threads: int
+) -> onnxruntime.InferenceSession:
+    """A graph, checked against the sizes of its inputs' and outputs' last axes.
+
+    Raises:
+        ModelError: it is damaged, or another graph than the card says.
+    """
+    session = _engine(path, threads)
+    sizes = {node.name: node.shape[-1] for node in (*session.get_inputs(), *session.get_outputs())}
+    if sizes != expected:
+        raise ModelError(f"{path}: the graph has {sizes}, the card needs {expected}. {_CURE}")
+    return session
+
+
+def _engine(path: Path, threads: int) -> onnxruntime.InferenceSession:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1

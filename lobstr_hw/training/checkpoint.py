@@ -13,8 +13,10 @@ from typing import Any
 import torch
 
 from lobstr_hw.errors import ModelError
+from lobstr_hw.features import input_size
 from lobstr_hw.training.config import TrainingConfig
 from lobstr_hw.training.dataset import Statistics
+from lobstr_hw.training.devices import device_of
 from lobstr_hw.training.network import LobstrNetwork
 from lobstr_hw.training.streams import Position
 from lobstr_hw.training.two_way_network import TwoWayNetwork
@@ -65,9 +67,15 @@ class Run:
 def new_run(config: TrainingConfig, stats: Statistics) -> Run:
     """Fresh weights from the seed."""
     torch.manual_seed(config.seed)
-    kind = TwoWayNetwork if config.recipe == "two-way" else LobstrNetwork
-    network = kind(config.hidden_size, torch.from_numpy(stats.output_mean))
+    network = _network(config, torch.from_numpy(stats.output_mean)).to(device_of(config))
     return Run(network, torch.optim.Adam(network.parameters(), lr=config.learning_rate), stats)
+
+
+def _network(config: TrainingConfig, output_mean: torch.Tensor) -> LobstrNetwork:
+    if config.recipe == "two-way":
+        return TwoWayNetwork(config.hidden_size, output_mean)
+    inputs = input_size(config.feature_form)
+    return LobstrNetwork(config.hidden_size, output_mean, config.network, inputs, config.window)
 
 
 def save_checkpoint(path: Path, run: Run) -> None:

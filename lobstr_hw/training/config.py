@@ -11,8 +11,11 @@ from lobstr_hw.training.augmentation import Augmentation
 
 __all__ = [
     "RECIPES",
+    "STEPPED_KINDS",
     "CarriedSettings",
+    "Device",
     "LossWeights",
+    "NetworkKind",
     "Recipe",
     "TrainingConfig",
     "TwoWaySettings",
@@ -21,6 +24,10 @@ __all__ = [
     "write_config",
 ]
 
+Device = Literal["auto", "cpu", "cuda"]
+NetworkKind = Literal["gru", "lstm", "rnn", "fc6", "cnn1d"]
+STEPPED_KINDS: tuple[NetworkKind, ...] = ("gru", "lstm", "rnn")
+"""Those that go from frame to frame with a state; the others see a whole window at once."""
 Recipe = Literal["paper", "carried", "two-way"]
 RECIPES: tuple[Recipe, ...] = ("paper", "carried", "two-way")
 
@@ -102,12 +109,14 @@ class TrainingConfig:
         steps: the paper's "epochs"; each is one batch, as the authors' code has it.
         batch: windows in a step.
         window: frames in a window, from a zero state; the loss is on the last one.
-        hidden_size: of the GRU.
+        network: kind of the encoder; all but ``gru`` are for the tables.
+        hidden_size: of the encoder.
         learning_rate, learning_rate_decay: Adam, and the factor per step.
         seed: of the first weights, the windows and their errors.
         precision: ``bf16`` is three times faster on processors that have it.
+        device: ``auto`` takes an accelerator where there is one.
         threads: torch's; more than one does not pay on small machines.
-        feature_form: ``v1``, or ``paper`` for the tables.
+        feature_form: ``v1``; the others are for the tables.
         contact_label: ``floor`` (height over a local floor, and speed), or ``paper`` (1 cm).
         mirror: half of the windows with left and right exchanged.
         validation_windows: drawn once from the validation clips.
@@ -118,11 +127,13 @@ class TrainingConfig:
     steps: int = 1500
     batch: int = 256
     window: int = 45
+    network: NetworkKind = "gru"
     hidden_size: int = 1024
     learning_rate: float = 1e-3
     learning_rate_decay: float = 0.999
     seed: int = 1
     precision: Literal["fp32", "bf16"] = "fp32"
+    device: Device = "auto"
     threads: int = 1
     feature_form: Form = "v1"
     contact_label: Literal["floor", "paper"] = "floor"
@@ -134,6 +145,18 @@ class TrainingConfig:
     validation_windows: int = 512
     validate_every: int = 50
     checkpoint_every: int = 50
+
+    def __post_init__(self) -> None:
+        """Other networks are trained by windows only.
+
+        Raises:
+            ModelError: they would not be.
+        """
+        if self.network != "gru" and self.recipe != "paper":
+            raise ModelError(
+                f"network {self.network!r} with recipe {self.recipe!r}: the tables' networks are "
+                "trained by windows. Take --recipe paper, or leave --network out."
+            )
 
 
 _CARRIED = TrainingConfig(

@@ -1,9 +1,10 @@
 """From a trained network to the two files that ship: NAME.onnx and NAME.json.
 
-The graph is a single step of the cell. Weights are stored as float16 and cast to float32 when the
+The graph is a single step of the cell. Matrices are stored as float16 and cast to float32 when the
 engine loads them (constant folding), which halves the file; what that costs is measured here.
 """
 
+import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,12 +15,14 @@ import onnx
 import torch
 from onnx import TensorProto, helper, numpy_helper
 
-from lobstr_hw.features import INPUT_SIZE
+from lobstr_hw.errors import ModelError
 from lobstr_hw.lower_body import POSE_SIZE
 from lobstr_hw.predictors.weights import NetworkCard, load_network, write_card
+from lobstr_hw.training.config import STEPPED_KINDS
 from lobstr_hw.training.network import CONTACT_SIZE, LobstrNetwork
+from lobstr_hw.training.step_graphs import step_nodes
 
-__all__ = ["ExportError", "export_network", "measure_export"]
+__all__ = ["ExportError", "export_network", "measure_export", "stored"]
 
 Float32 = npt.NDArray[np.float32]
 
@@ -42,7 +45,15 @@ def export_network(network: LobstrNetwork, card: NetworkCard, path: Path) -> Exp
 
     Returns:
         What float16 storage costs.
+
+    Raises:
+        ModelError: this kind of network has no single step.
     """
+    if network.kind not in STEPPED_KINDS:
+        raise ModelError(
+            f"a network of kind {network.kind!r} sees a whole window at once and has no step to "
+            f"export. Those of {', '.join(STEPPED_KINDS)} have."
+        )
     path.parent.mkdir(parents=True, exist_ok=True)
     onnx.save(_model(network), str(path))
     write_card(path.with_suffix(".json"), card)
@@ -53,7 +64,7 @@ def measure_export(network: LobstrNetwork, path: Path, steps: int = 200) -> Expo
     """Run the file and the network side by side, both carrying their own state."""
     exported = load_network(path)
     rng = np.random.default_rng(0)
-    x = rng.standard_normal((steps, 16, INPUT_SIZE)).astype(np.float32)
+    x = rng.standard_normal((steps, 16, len(exported.card.input_mean))).astype(np.float32)
     h: Float32 = np.zeros((16, exported.card.hidden_size), dtype=np.float32)
     hidden: torch.Tensor | None = None
     worst = np.zeros(3)
@@ -67,17 +78,30 @@ def measure_export(network: LobstrNetwork, path: Path, steps: int = 200) -> Expo
     return ExportError(*(float(w) for w in worst))
 
 
+def stored(network: LobstrNetwork) -> LobstrNetwork:
+    """The network whose matrices are what the file holds: it and the engine say the same."""
+    rounded = copy.deepcopy(network)
+    with torch.no_grad():
+        for parameter in rounded.parameters():
+            if parameter.dim() > 1:
+                parameter.copy_(parameter.half().float())
+    return rounded
+
+
 def _model(network: LobstrNetwork) -> onnx.ModelProto:
     weights = _weights(network)
-    stored = [numpy_helper.from_array(w.astype(np.float16), k + "_16") for k, w in weights.items()]
-    casts = [helper.make_node("Cast", [k + "_16"], [k], to=TensorProto.FLOAT) for k in weights]
-    hidden = network.gru.hidden_size
+    matrices = [k for k, w in weights.items() if w.ndim > 1]
+    arrays = {k: w for k, w in weights.items() if w.ndim == 1}
+    arrays |= {k + "_16": weights[k].astype(np.float16) for k in matrices}
+    arrays["one"] = np.array(1.0, dtype=np.float32)
+    casts = [helper.make_node("Cast", [k + "_16"], [k], to=TensorProto.FLOAT) for k in matrices]
+    state = network.state_size
     graph = helper.make_graph(
-        [*casts, *_cell_nodes()],
+        [*casts, *step_nodes(network.kind)],
         "lobstr_step",
-        [_value("x", INPUT_SIZE), _value("h", hidden)],
-        [_value("h_next", hidden), _value("pose", POSE_SIZE), _value("contact", CONTACT_SIZE)],
-        [*stored, numpy_helper.from_array(np.array(1.0, dtype=np.float32), "one")],
+        [_value("x", len(weights["W_x"])), _value("h", state)],
+        [_value("h_next", state), _value("pose", POSE_SIZE), _value("contact", CONTACT_SIZE)],
+        [numpy_helper.from_array(array, k) for k, array in arrays.items()],
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)])
     model.ir_version = IR_VERSION
@@ -91,12 +115,14 @@ def _value(name: str, size: int) -> onnx.ValueInfoProto:
 
 def _weights(network: LobstrNetwork) -> dict[str, Float32]:
     """Every matrix as (in, out), so that a step is x @ W + b."""
-    gru = network.gru
+    cell = dict(network.encoder.named_parameters(prefix="cell"))
+    if network.kind == "lstm":
+        cell = dict(network.encoder.named_parameters())
     tensors: dict[str, Any] = {
-        "W_x": gru.weight_ih_l0.T,
-        "b_x": gru.bias_ih_l0,
-        "W_h": gru.weight_hh_l0.T,
-        "b_h": gru.bias_hh_l0,
+        "W_x": cell["cell.weight_ih_l0"].T,
+        "b_x": cell["cell.bias_ih_l0"],
+        "W_h": cell["cell.weight_hh_l0"].T,
+        "b_h": cell["cell.bias_hh_l0"],
         "W_latent": network.latent.weight.T,
         "b_latent": network.latent.bias,
         "W_pose": network.pose.weight.T,
@@ -105,32 +131,3 @@ def _weights(network: LobstrNetwork) -> dict[str, Float32]:
         "b_contact": network.contact.bias,
     }
     return {k: t.detach().float().contiguous().numpy() for k, t in tensors.items()}
-
-
-def _cell_nodes() -> list[onnx.NodeProto]:
-    """The GRU of torch: h' = (1 - z) n + z h, n = tanh(x_n + r (h W + b)_n)."""
-
-    def node(op: str, inputs: str, outputs: str, **attributes: Any) -> onnx.NodeProto:
-        return helper.make_node(op, inputs.split(), outputs.split(), **attributes)
-
-    return [
-        node("Gemm", "x W_x b_x", "gx"),
-        node("Gemm", "h W_h b_h", "gh"),
-        node("Split", "gx", "x_r x_z x_n", axis=1),
-        node("Split", "gh", "h_r h_z h_n", axis=1),
-        node("Add", "x_r h_r", "sum_r"),
-        node("Sigmoid", "sum_r", "r"),
-        node("Add", "x_z h_z", "sum_z"),
-        node("Sigmoid", "sum_z", "z"),
-        node("Mul", "r h_n", "reset_n"),
-        node("Add", "x_n reset_n", "sum_n"),
-        node("Tanh", "sum_n", "new"),
-        node("Sub", "one z", "fresh"),
-        node("Mul", "fresh new", "from_new"),
-        node("Mul", "z h", "from_old"),
-        node("Add", "from_new from_old", "h_next"),
-        node("Gemm", "h_next W_latent b_latent", "latent_in"),
-        node("Relu", "latent_in", "latent"),
-        node("Gemm", "latent W_pose b_pose", "pose"),
-        node("Gemm", "latent W_contact b_contact", "contact"),
-    ]

@@ -1,7 +1,6 @@
 """The training loop: one step is a function of the run, the clips and the step's number."""
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager
 
 import numpy as np
 import torch
@@ -12,6 +11,7 @@ from lobstr_hw.training.carried import train_carried
 from lobstr_hw.training.checkpoint import Run
 from lobstr_hw.training.config import TrainingConfig
 from lobstr_hw.training.dataset import Clips, Statistics, Windows, draw_windows
+from lobstr_hw.training.devices import precision_of
 from lobstr_hw.training.kinematics import rotations_from_6d, toes_in_reference
 from lobstr_hw.training.losses import Targets, losses
 from lobstr_hw.training.two_way import train_two_way
@@ -62,7 +62,7 @@ def train_step(run: Run, clips: Clips, config: TrainingConfig) -> list[float]:
     for group in run.optimizer.param_groups:
         group["lr"] = learning_rate
     run.network.train()
-    with _precision(config):
+    with precision_of(config):
         pose, logits, _ = run.network(_input(windows, run.stats))
     terms = losses(pose, logits, _targets(windows), config.weights)
     run.optimizer.zero_grad(set_to_none=True)
@@ -75,7 +75,7 @@ def train_step(run: Run, clips: Clips, config: TrainingConfig) -> list[float]:
 def validate(run: Run, windows: Windows, config: TrainingConfig) -> list[float]:
     """Toe error in cm, rotation error over 8 joints in degrees, contact accuracy and balanced."""
     run.network.eval()
-    with torch.no_grad(), _precision(config):
+    with torch.no_grad(), precision_of(config):
         pose, logits, _ = run.network(_input(windows, run.stats))
     truth = torch.from_numpy(windows.pose)
     toe = (toes_in_reference(pose) - toes_in_reference(truth)).norm(dim=-1).mean()
@@ -110,7 +110,3 @@ def _targets(windows: Windows) -> Targets:
         torch.from_numpy(windows.pose_before),
         torch.from_numpy(windows.contact),
     )
-
-
-def _precision(config: TrainingConfig) -> AbstractContextManager[object]:
-    return torch.autocast("cpu", dtype=torch.bfloat16, enabled=config.precision == "bf16")

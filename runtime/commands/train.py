@@ -5,6 +5,7 @@ import json
 import sys
 import time
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from lobstr_hw.training.checkpoint import Run
     from lobstr_hw.training.config import TrainingConfig
     from lobstr_hw.training.dataset import Clips
+    from lobstr_hw.training.processes import Processes
 
 __all__ = ["main"]
 
@@ -24,7 +26,11 @@ EXAMPLES = """examples:
   lobstr-train DATA --out runs/2 --recipe carried     the small network that ships
   lobstr-train DATA --out runs/1 --resume      go on after a stop
   lobstr-train --export runs/1 lobstr.onnx     write lobstr.onnx and lobstr.json
+  torchrun --nproc-per-node 4 -m lobstr_hw.runtime.commands.train DATA --out runs/3
+                                               four processes share each batch
 """
+LEFT_OUT = {"P": {"toe": 0.0, "velocity": 0.0}, "PK": {"velocity": 0.0}}
+"""Weights of the losses that a combination (the paper's Table 2) does not have."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -70,6 +76,23 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--steps", type=int, help="of one batch (1500; carried 4000; two-way 2600)")
     parser.add_argument("--seed", type=int, help="of weights, windows and errors (1)")
     parser.add_argument("--precision", choices=("fp32", "bf16"), help="of the products (fp32)")
+    parser.add_argument(
+        "--device", choices=("auto", "cpu", "cuda"), help="auto (default): an accelerator if any"
+    )
+    parser.add_argument(
+        "--network", choices=("gru", "lstm", "rnn", "fc6", "cnn1d"), help="kind (gru), for tables"
+    )
+    parser.add_argument(
+        "--features",
+        dest="feature_form",
+        choices=("v1", "paper", "position", "combined"),
+        help="form of the input (v1), for tables",
+    )
+    parser.add_argument(
+        "--losses",
+        choices=("P", "PK", "PKV"),
+        help="of pose, toes (K) and their velocity (V), beside contact; all by default",
+    )
     parser.add_argument("--cache", type=Path, metavar="DIR", help="retargeted clips (OUT/cache)")
     parser.add_argument(
         "--export", nargs=2, type=Path, metavar=("DIR", "OUT"), help="write weights"
@@ -100,64 +123,86 @@ def _export(options: argparse.Namespace) -> int:
 def _train(options: argparse.Namespace) -> int:
     from lobstr_hw.splits import default_split, read_split
     from lobstr_hw.training.gather import describe, gather, part_of_clips
+    from lobstr_hw.training.processes import processes
 
     split = read_split(options.split) if options.split else default_split()
     out: Path = options.out
     out.mkdir(parents=True, exist_ok=True)
     config = _config(options)
-    clips = gather(options.data, split, options.cache or out / "cache", _retargeting_bar)
-    train = part_of_clips(clips, split, "train")
-    validation = part_of_clips(clips, split, "validation")
-    _write_json(out / "data.json", describe(train, split))
-    run = _start(out, config, train, options.resume)
-    _run(out, run, config, train, validation if len(validation) else None)
+    with processes() as who:
+        with who.one_goes_ahead():
+            clips = gather(options.data, split, options.cache or out / "cache", _retargeting_bar)
+        train = part_of_clips(clips, split, "train")
+        validation = part_of_clips(clips, split, "validation") if who.first else None
+        run = _start(out, config, train, options.resume, who)
+        if who.first:
+            _write_json(out / "data.json", describe(train, split))
+        _run(out, run, config, (train, validation or None), who)
     return 0
 
 
 def _config(options: argparse.Namespace) -> "TrainingConfig":
     from lobstr_hw.training.config import read_config, recipe_config
 
-    named = {key: getattr(options, key) for key in ("steps", "seed", "precision")}
+    keys = ("steps", "seed", "precision", "device", "network", "feature_form")
+    named = {key: getattr(options, key) for key in keys}
     changes = {key: value for key, value in named.items() if value is not None}
     kept = options.out / "config.json"
     source = options.config or (kept if options.resume else None)
     if source:
-        return read_config(source, **changes)
-    return recipe_config(options.recipe or "paper", **changes)
+        config = read_config(source, **changes)
+    else:
+        config = recipe_config(options.recipe or "paper", **changes)
+    left_out = LEFT_OUT.get(options.losses, {})
+    return replace(config, weights=replace(config.weights, **left_out)) if left_out else config
 
 
-def _start(out: Path, config: "TrainingConfig", train: "Clips", resume: bool) -> "Run":
+def _start(
+    out: Path, config: "TrainingConfig", train: "Clips", resume: bool, who: "Processes"
+) -> "Run":
     from lobstr_hw.training.checkpoint import load_checkpoint, new_run
     from lobstr_hw.training.config import write_config
     from lobstr_hw.training.dataset import statistics
+    from lobstr_hw.training.processes import part_of
 
     checkpoint = out / "checkpoint.pt"
     if resume:
-        return load_checkpoint(checkpoint, config)
+        run = load_checkpoint(checkpoint, config)
+        run.carried = part_of(run.carried, who)
+        return run
     if checkpoint.exists():
         raise ModelError(f"{checkpoint} exists: go on with --resume, or give another --out.")
-    write_config(out / "config.json", config)
+    if who.first:
+        write_config(out / "config.json", config)
     return new_run(config, statistics(train, config))
 
 
 def _run(
-    out: Path, run: "Run", config: "TrainingConfig", train: "Clips", validation: "Clips | None"
+    out: Path,
+    run: "Run",
+    config: "TrainingConfig",
+    clips: "tuple[Clips, Clips | None]",
+    who: "Processes",
 ) -> None:
     from tqdm import tqdm
 
-    from lobstr_hw.training.loop import train as training
+    from lobstr_hw.training.loop import train
+    from lobstr_hw.training.processes import average_gradients, share_of
 
+    average_gradients(run.network, who)
     spent, began = run.wall_s, time.perf_counter()
-    bar = tqdm(total=config.steps, initial=run.step, unit="step", file=sys.stderr)
+    bar = tqdm(
+        total=config.steps, initial=run.step, unit="step", file=sys.stderr, disable=not who.first
+    )
     with bar, StopRequest() as stop:
-        for _ in training(run, train, validation, config):
+        for _ in train(run, *clips, share_of(config, who)):
             run.wall_s = spent + time.perf_counter() - began
             bar.update()
             bar.set_postfix(_figures(run), refresh=False)
-            last = run.step == config.steps
-            if run.step % config.checkpoint_every == 0 or last or stop():
-                _keep(out, run)
-            if stop() and not last:
+            last, stopping = run.step == config.steps, who.any(stop())
+            if run.step % config.checkpoint_every == 0 or last or stopping:
+                _keep(out, run, who)
+            if stopping and not last:
                 _say(f"stopped after step {run.step}; go on with --resume")
                 return
 
@@ -169,10 +214,14 @@ def _figures(run: "Run") -> dict[str, str]:
     return figures
 
 
-def _keep(out: Path, run: "Run") -> None:
+def _keep(out: Path, run: "Run", who: "Processes") -> None:
     from lobstr_hw.training.checkpoint import save_checkpoint
     from lobstr_hw.training.plots import plot_curves, write_curves
+    from lobstr_hw.training.processes import gathered
 
+    run = replace(run, carried=gathered(run.carried, who))
+    if not who.first:
+        return
     save_checkpoint(out / "checkpoint.pt", run)
     write_curves(out, run)
     plot_curves(out / "curve.png", run)

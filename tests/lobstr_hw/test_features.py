@@ -13,6 +13,7 @@ from lobstr_hw.features import (
     clip_features,
     clip_points,
     features,
+    input_size,
     mirror_features,
     reference_frame,
     reference_frames,
@@ -21,7 +22,7 @@ from lobstr_hw.motion import mirrored
 from lobstr_hw.rotations import Array, from_6d, from_rotation_vector, rotation_x, rotation_y
 from lobstr_hw.trackers import ROLE_JOINT
 
-FORMS: tuple[Form, ...] = ("v1", "paper")
+FORMS: tuple[Form, ...] = ("v1", "paper", "position", "combined")
 IDENTITY_6D = [0.0, 0.0, 1.0, 0.0, 1.0, 0.0]
 
 
@@ -176,10 +177,24 @@ def test_a_role_whose_validity_changes_gives_no_movement_for_that_step(what: str
     assert broken == pytest.approx(x)
 
 
-def test_the_paper_scales_nothing_but_the_height() -> None:
+@pytest.mark.parametrize("form", FORMS[1:])
+def test_the_papers_forms_scale_nothing_but_the_height(form: Form) -> None:
     p, R = moving()
     s = 1.25
-    user = clip_features(clip_points(p / s, R, form="paper"), "paper")
-    scaled = clip_features(clip_points(p, R, form="paper"), "paper", scale=s)
+    user = clip_features(clip_points(p / s, R, form=form), form)
+    scaled = clip_features(clip_points(p, R, form=form), form, scale=s)
     assert scaled[:, :-1] == pytest.approx(user[:, :-1])
     assert scaled[:, -1] == pytest.approx(s * user[:, -1])
+
+
+def test_places_are_those_of_head_and_hands_seen_from_the_pelvis() -> None:
+    p, R = moving()
+    x = {form: clip_features(clip_points(p, R, form=form), form) for form in FORMS}
+    assert {form: x[form].shape[1] for form in FORMS} == {form: input_size(form) for form in FORMS}
+    to_ref = np.swapaxes(reference_frames(R[:, 0], "position"), -1, -2)[:, None]
+    seen = x["position"][:, 9:-1].reshape(-1, 3, 9)
+    assert seen[..., :3] == pytest.approx((to_ref @ (p[:, 1:] - p[:, :1])[..., None])[..., 0])
+    assert from_6d(seen[..., 3:]) == pytest.approx(to_ref @ R[:, 1:])
+    assert x["position"][:, :9] == pytest.approx(x["paper"][:, :9])
+    both = np.concatenate([x["paper"][:, :-1], x["position"][:, 9:]], axis=1)
+    assert x["combined"] == pytest.approx(both)
