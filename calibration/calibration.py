@@ -49,6 +49,13 @@ class TrackingSpace:
     residual_m: float = 0.0
     residual_rad: float = 0.0
 
+    @property
+    def is_world(self) -> bool:
+        """Nothing is to be moved."""
+        T = self.T_world_space
+        same = np.array_equal(T.R, np.eye(3)) and not T.p.any()
+        return bool(same and self.delay_s == 0.0)
+
 
 def _no_spaces() -> Mapping[str, TrackingSpace]:
     return MappingProxyType({})

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lobstr_hw.calibration.alike import common_s, turning_likeness
 from lobstr_hw.calibration.calibration import TrackingSpace
 from lobstr_hw.calibration.hand_eye import fit_positions, fit_rotations, wobble
 from lobstr_hw.calibration.track import Track
@@ -20,11 +21,7 @@ LEAST_S = 3.0
 """Of both trackers being seen."""
 LEAST_WOBBLE_RAD = float(np.deg2rad(15.0))
 """Below this errors of the trackers are multiplied by more than three."""
-MOST_DELAY_S = 0.25
-"""Between the stamps of two drivers; serial lines and radio take some tens of milliseconds."""
 NEAR_S = 0.015
-GRID_HZ = 100.0
-SPEED_S = 0.04
 PAIRS = 300
 """Moments that the delay is found with; all of them give the rest."""
 LEVER_M = 0.5
@@ -127,28 +124,13 @@ def _check_together(fit: SpaceAlignment) -> None:
 
 
 def _coarse_delay(a: Track, b: Track) -> float:
-    """By the angular speeds, which know no frame: where they look most alike."""
-    start = max(a.times_s[0], b.times_s[0])
-    end = min(a.times_s[-1], b.times_s[-1])
-    if end - start < LEAST_S:
+    seconds = common_s(a, b)
+    if seconds < LEAST_S:
         raise SpacesNotJoined(
-            f"both were seen for {max(0.0, end - start):.1f} s, {LEAST_S:g} are needed: go on "
+            f"both were seen for {max(0.0, seconds):.1f} s, {LEAST_S:g} are needed: go on "
             "moving them in sight of both systems."
         )
-    times = np.arange(start, end, 1.0 / GRID_HZ)
-    speed_a, speed_b = _speed(a, times), _speed(b, times)
-    most = int(MOST_DELAY_S * GRID_HZ)
-    middle = speed_a[most : len(times) - most]
-    likeness = [
-        np.corrcoef(middle, speed_b[shift : shift + len(middle)])[0, 1]
-        for shift in range(2 * most + 1)
-    ]
-    return float(np.argmax(likeness) - most) / GRID_HZ
-
-
-def _speed(track: Track, times_s: Array) -> Array:
-    before, after = (track.at(times_s + side * SPEED_S / 2)[1] for side in (-1.0, 1.0))
-    return geodesic_angle(before, after) / SPEED_S
+    return turning_likeness(a, b)[0]
 
 
 def _misfit(a: Track, b: Track, delay_s: float) -> float:
@@ -201,7 +183,7 @@ def _minimum(f: Callable[[float], float], low: float, high: float) -> float:
     golden = (np.sqrt(5.0) - 1.0) / 2.0
     c, d = high - golden * (high - low), low + golden * (high - low)
     f_c, f_d = f(c), f(d)
-    while high - low > 1e-9:
+    while high - low > 1e-8:
         if f_c < f_d:
             high, d, f_d = d, c, f_c
             c = high - golden * (high - low)

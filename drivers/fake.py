@@ -7,12 +7,19 @@ import numpy as np
 
 from lobstr_hw.drivers.driver import DeviceEvent, DeviceInfo, Probe, TrackerDriver
 from lobstr_hw.drivers.fake_script import SCRIPTS
-from lobstr_hw.poses import PartialPose
-from lobstr_hw.rotations import Array, rotation_x, rotation_y, rotation_z
+from lobstr_hw.poses import PartialPose, Pose
+from lobstr_hw.rotations import (
+    Array,
+    from_rotation_vector,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+    slerp,
+)
 from lobstr_hw.skeleton import EYES, GRIP, Body, Joint, forward_kinematics
 from lobstr_hw.trackers import FOUR_POINTS, ROLE_JOINT, TrackerRole, TrackerSample
 
-__all__ = ["FakeDriver"]
+__all__ = ["OTHER_SPACE", "FakeDriver"]
 
 SERIALS = {role: f"FAKE-{role.upper().replace('_', '-')}" for role in FOUR_POINTS}
 KINDS = dict(zip(FOUR_POINTS, ("headset", "controller", "controller", "tracker"), strict=True))
@@ -23,6 +30,15 @@ MOUNTS = {
     TrackerRole.PELVIS: np.array([0.0, 0.03, 0.11]),
 }
 """Where each device sits in its joint, metres on the standard skeleton."""
+
+IN_HAND = Pose(from_rotation_vector(np.array([0.4, -1.1, 2.0])), np.array([0.03, -0.05, 0.08]))
+"""The pelvis tracker in the left controller's frame, where a script holds them together."""
+STRAP_S = 0.8
+"""It takes so long to get from there to the belt."""
+OTHER_SPACE = Pose(
+    from_rotation_vector(np.array([0.1, 1.9, -0.2])), np.array([1.5, 0.4, -2.0])
+).inverse()
+"""From the world to the tracking space of a driver with ``apart=1``."""
 
 T_POSE_S = 4.0
 """Long enough for the calibration's 3 s."""
@@ -48,6 +64,8 @@ class FakeDriver(TrackerDriver):
         "script": str,
         "named": int,
         "battery": float,
+        "has": str,
+        "apart": int,
     }
     """What ``--driver fake:...`` understands, and how it is read."""
 
@@ -59,6 +77,8 @@ class FakeDriver(TrackerDriver):
         script: str = "",
         named: int = 1,
         battery: float = 1.0,
+        has: str = "",
+        apart: int = 0,
     ) -> None:
         """Choose a person.
 
@@ -69,6 +89,8 @@ class FakeDriver(TrackerDriver):
             script: name of a script (drivers/fake_script.py); empty for the plain person.
             named: 0 keeps to itself what each device is, as trackers without roles do.
             battery: of every device, 0 to 1.
+            has: roles of the devices that there are, joined by +; all four if empty.
+            apart: 1 for poses in a tracking space of its own (``OTHER_SPACE``).
         """
         if script and script not in SCRIPTS:
             raise ValueError(f"no script is called {script!r}; known: {', '.join(SCRIPTS)}")
@@ -78,6 +100,8 @@ class FakeDriver(TrackerDriver):
         self._body = Body.standard(1, height_cm / 170.6)
         self._script = SCRIPTS.get(script)
         self._named, self._battery = named != 0, battery
+        self._roles = _roles(has)
+        self._space = OTHER_SPACE if apart else Pose.identity()
         self._next = 0
         self._random = np.random.default_rng(seed)
         self._is_open = False
@@ -107,11 +131,15 @@ class FakeDriver(TrackerDriver):
             return ()
         joints = _joints if self._script is None else self._script.joints
         p, R = _trackers(*joints(times, self._body), self._body)
+        if self._script is not None:
+            _hold(p, R, times, self._script.in_hand)
+        p, R = self._space.apply(p), self._space.R @ R
         p = p + self._random.normal(scale=JITTER_M, size=p.shape)
         return [
             TrackerSample(SERIALS[role], PartialPose(R[i, k], p[i, k]), float(time_s), tracked=True)
             for i, time_s in enumerate(times)
             for k, role in enumerate(FOUR_POINTS)
+            if role in self._roles
         ]
 
     def devices(self) -> Sequence[DeviceInfo]:
@@ -121,11 +149,11 @@ class FakeDriver(TrackerDriver):
         if not self._named:
             return [
                 DeviceInfo(SERIALS[role], "tracker", "fake", battery=self._battery)
-                for role in FOUR_POINTS
+                for role in self._roles
             ]
         return [
             DeviceInfo(SERIALS[role], KINDS[role], "fake", role, battery=self._battery)
-            for role in FOUR_POINTS
+            for role in self._roles
         ]
 
     def events(self) -> Sequence[DeviceEvent]:
@@ -134,11 +162,32 @@ class FakeDriver(TrackerDriver):
             return ()
         events = self._script.events(self._told_s, self._now_s, SERIALS)
         self._told_s = self._now_s
-        return events
+        own = {SERIALS[role] for role in self._roles}
+        return [event for event in events if event.serial in own]
 
     def close(self) -> None:
         """Stop giving samples; twice is harmless."""
         self._is_open = False
+
+
+def _roles(text: str) -> tuple[TrackerRole, ...]:
+    """The devices that there are, in the order of FOUR_POINTS."""
+    names = text.split("+") if text else list(FOUR_POINTS)
+    unknown = [name for name in names if name not in FOUR_POINTS]
+    if unknown:
+        raise ValueError(f"has={text}: {unknown[0]!r} is not one of {', '.join(FOUR_POINTS)}")
+    return tuple(role for role in FOUR_POINTS if role in names)
+
+
+def _hold(p: Array, R: Array, times_s: Array, in_hand: tuple[float, float]) -> None:
+    """Put the pelvis tracker against the left controller between two times, then on its belt."""
+    if in_hand[1] <= in_hand[0]:
+        return
+    left, pelvis = (FOUR_POINTS.index(r) for r in (TrackerRole.LEFT_HAND, TrackerRole.PELVIS))
+    held = 1.0 - _smooth((times_s - in_hand[1]) / STRAP_S)
+    p_held, R_held = p[:, left] + R[:, left] @ IN_HAND.p, R[:, left] @ IN_HAND.R
+    p[:, pelvis] += held[:, None] * (p_held - p[:, pelvis])
+    R[:, pelvis] = slerp(R[:, pelvis], R_held, held)
 
 
 def _trackers(p: Array, R: Array, body: Body) -> tuple[Array, Array]:

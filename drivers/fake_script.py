@@ -1,13 +1,13 @@
 """What the fake person does, second by second: poses between which it moves, and buttons."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from lobstr_hw.drivers.driver import DeviceEvent, EventKind
-from lobstr_hw.rotations import Array, rotation_x, rotation_y, rotation_z
+from lobstr_hw.rotations import Array, from_rotation_vector, rotation_x, rotation_y, rotation_z
 from lobstr_hw.skeleton import Body, Joint, forward_kinematics
 from lobstr_hw.trackers import TrackerRole
 
@@ -49,11 +49,14 @@ class Script:
         arms: times and how far the arms are down, 0 (out) to 1 (hanging), straight between.
         moves: what else happens.
         presses: of buttons.
+        in_hand: from when to when the pelvis tracker is held against the left controller instead of
+            sitting on its belt.
     """
 
     arms: Sequence[tuple[float, float]]
     moves: Sequence[Move] = ()
     presses: Sequence[Press] = field(default_factory=tuple)
+    in_hand: tuple[float, float] = (0.0, 0.0)
 
     def joints(self, times_s: Array, body: Body) -> tuple[Array, Array]:
         """The person (m, 22, 3) and (m, 22, 3, 3); the legs stay straight."""
@@ -138,6 +141,14 @@ def _turn(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
     R[at, Joint.HIPS] = rotation_y(2.0 * np.pi * a) @ R[at, Joint.HIPS]
 
 
+def _swirl(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
+    """A hand turned about all axes: steering wheel, key and nod at once."""
+    strength = np.minimum(1.0, 12.0 * a * (1.0 - a))
+    about = np.stack([np.sin(2.0 * np.pi * n * a + n) for n in (5.0, 7.0, 4.0)], axis=-1)
+    turn = from_rotation_vector(np.radians(45.0) * strength[:, None] * about)
+    R[at, Joint.LEFT_LOWER_ARM] = R[at, Joint.LEFT_LOWER_ARM] @ turn
+
+
 def _reach_down(a: Array, R: Array, p: Array, at: Bools, size: float) -> None:
     """Crouch and lay the right hand down."""
     p[at, 1] -= 0.45 * size * a
@@ -153,6 +164,7 @@ _MOVES: Mapping[str, Callable[[Array, Array, Array, Bools, float], None]] = {
     "walk": _walk,
     "turn": _turn,
     "reach_down": _reach_down,
+    "swirl": _swirl,
 }
 
 
@@ -174,16 +186,31 @@ def _movement(start_s: float) -> tuple[Move, ...]:
     return tuple(moves)
 
 
-SCRIPTS: Mapping[str, Script] = {
-    "calibrate": Script(
-        arms=((0.0, 1.0), (2.0, 1.0), (2.8, 0.0), (6.2, 0.0), (7.0, 1.0)),
-        moves=_movement(7.1),
-        # agrees to the roles; then goes on as soon as each part of the movement is done
+def _calibrating(start_s: float = 0.0) -> Script:
+    """Somebody who does as the wizard says, from ``start_s`` on."""
+    arms = ((2.0, 1.0), (2.8, 0.0), (6.2, 0.0), (7.0, 1.0))
+    # agrees to the roles; then goes on as soon as each part of the movement is done
+    pressed_s = (0.8, 6.6, 9.6, 12.0, 13.4, 15.4, 17.7)
+    return Script(
+        arms=((0.0, 1.0), *((start_s + time_s, down) for time_s, down in arms)),
+        moves=_movement(start_s + 7.1),
         presses=tuple(
-            Press(_RIGHT, "trigger", time_s, time_s + 0.1)
-            for time_s in (0.8, 6.6, 9.6, 12.0, 13.4, 15.4, 17.7)
+            Press(_RIGHT, "trigger", start_s + time_s, start_s + time_s + 0.1)
+            for time_s in pressed_s
         ),
-    ),
+    )
+
+
+def _joining(start_s: float) -> Script:
+    """The same, after the pelvis tracker was held against the left controller for ten seconds."""
+    script, held = _calibrating(start_s), (0.0, start_s - 1.0)
+    swirl = Move("swirl", *held, lambda x: x)
+    return replace(script, moves=(swirl, *script.moves), in_hand=held)
+
+
+SCRIPTS: Mapping[str, Script] = {
+    "calibrate": _calibrating(),
+    "join": _joining(11.0),
     "gestures": Script(
         arms=((0.0, 0.0), (4.0, 0.0), (5.0, 1.0)),
         presses=(

@@ -1,15 +1,16 @@
 """Which calibration profile a session begins with, if any."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from lobstr_hw.calibration import Calibration, check_devices, load_profile
+from lobstr_hw.calibration import Calibration, TrackingSpace, check_devices, load_profile
 from lobstr_hw.calibration.profile import profile_from_json
 from lobstr_hw.drivers.driver import TrackerDriver
 from lobstr_hw.drivers.replay import ReplayDriver
+from lobstr_hw.errors import ProfileError
 from lobstr_hw.runtime.profile_path import default_profile_path
 
-__all__ = ["chosen_profile"]
+__all__ = ["chosen_profile", "spaces_as_before"]
 
 
 def chosen_profile(
@@ -61,3 +62,21 @@ def _own_profile(
         return None
     tell(f"calibrated by {path}")
     return profile
+
+
+def spaces_as_before(source: Path | ReplayDriver, world: str) -> Mapping[str, TrackingSpace]:
+    """How an old profile joins tracking spaces; nothing where it has another world, or is broken.
+
+    Args:
+        source: of the profile: a file, which need not exist, or a log, which need not have one.
+        world: name of the space that is the world now.
+    """
+    try:
+        if isinstance(source, ReplayDriver):
+            text = source.log.profile
+            spaces = {} if text is None else profile_from_json(text.decode()).tracking_spaces
+        else:
+            spaces = load_profile(source).tracking_spaces
+    except ProfileError:
+        return {}
+    return spaces if world in spaces and spaces[world].is_world else {}

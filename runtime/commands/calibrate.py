@@ -110,7 +110,7 @@ def _run(args: argparse.Namespace, stop: Callable[[], bool]) -> int:
         raise ProfileError(
             f"{path} is left as it was. --yes replaces it; or give another --profile FILE."
         )
-    person = _wizard_on_log(args, driver, stop) if args.sim else _wizard(args, driver, stop)
+    person = _wizard_on_log(args, driver, stop) if args.sim else _wizard(args, path, driver, stop)
     if person is None:
         raise KeyboardInterrupt
     _save(args, path, person)
@@ -159,9 +159,12 @@ def _wizard_on_log(
         LogFileError: the log cannot be read.
         MissingRole, TPoseNotFound: what was seen, and what to do.
     """
+    from lobstr_hw.calibration import TrackingSpace
     from lobstr_hw.drivers.replay import ReplayDriver
+    from lobstr_hw.runtime.one_space import spaces_apart
+    from lobstr_hw.runtime.profiles import spaces_as_before
     from lobstr_hw.runtime.wizard.flow import Wizard
-    from lobstr_hw.runtime.wizard.plan import steps_for_a_log
+    from lobstr_hw.runtime.wizard.plan import steps_for_a_log, steps_to_join
     from lobstr_hw.runtime.wizard.run import run_on_log
 
     assert isinstance(driver, ReplayDriver)
@@ -169,29 +172,43 @@ def _wizard_on_log(
         damage = driver.log.damage
         if damage:
             _tell(f"{args.sim}: {damage}; looking at the {driver.duration_s:.1f} s before.")
-        steps = steps_for_a_log(floor_clearance_m=_clearance_m(args))
+        world = spaces_apart(driver)
+        if world is not None:
+            world.join_as_before(spaces_as_before(driver, world.name))
+        steps = steps_to_join(world) + steps_for_a_log(floor_clearance_m=_clearance_m(args))
         wizard = Wizard(_person(args, driver.log.unix_offset_s), steps)
-        run_on_log(driver, wizard, stop)
+        run_on_log(driver, wizard, stop, world)
+        wizard.person.spaces = {"replay": TrackingSpace()} if world is None else world.spaces
     return wizard.person if wizard.done else None
 
 
 def _wizard(
-    args: argparse.Namespace, driver: "TrackerDriver", stop: Callable[[], bool]
+    args: argparse.Namespace, path: Path, driver: "TrackerDriver", stop: Callable[[], bool]
 ) -> "Person | None":
     """What a person does; None when stopped."""
+    from lobstr_hw.calibration import TrackingSpace
     from lobstr_hw.runtime.clock import HostClock
+    from lobstr_hw.runtime.one_space import spaces_apart
+    from lobstr_hw.runtime.profiles import spaces_as_before
+    from lobstr_hw.runtime.sources import space_name
     from lobstr_hw.runtime.wizard.flow import Wizard
     from lobstr_hw.runtime.wizard.front import PersonFront
-    from lobstr_hw.runtime.wizard.plan import steps_for_a_person
+    from lobstr_hw.runtime.wizard.plan import steps_for_a_person, steps_to_join
     from lobstr_hw.runtime.wizard.result import spoken_result
     from lobstr_hw.runtime.wizard.run import run_with_person
 
-    steps = steps_for_a_person(floor_clearance_m=_clearance_m(args), confirm=not args.yes)
     clock = HostClock()
-    wizard = Wizard(_person(args, clock.unix_s()), steps, countdown_s=args.countdown)
     front = PersonFront(speech=not args.no_speech, terminal=sys.stderr.isatty(), tell=_tell)
     with driver, front:
-        run_with_person(driver, wizard, front, clock, stop, args.timeout)
+        world = spaces_apart(driver)
+        before = {} if world is None else spaces_as_before(path, world.name)
+        steps = steps_to_join(world, before)
+        steps += steps_for_a_person(floor_clearance_m=_clearance_m(args), confirm=not args.yes)
+        wizard = Wizard(_person(args, clock.unix_s()), steps, countdown_s=args.countdown)
+        run_with_person(world or driver, wizard, front, clock, stop, args.timeout)
+        names = [space_name(spec) for spec in args.driver[:1]]
+        alone = {name: TrackingSpace() for name in names}
+        wizard.person.spaces = alone if world is None else world.spaces
         if wizard.done:
             front.say([spoken_result(wizard.person)])
             front.show(wizard.view())
@@ -200,15 +217,10 @@ def _wizard(
 
 def _save(args: argparse.Namespace, path: Path, person: "Person") -> None:
     from lobstr_hw.calibration import save_profile
-    from lobstr_hw.calibration.calibration import TrackingSpace
-    from lobstr_hw.runtime.sources import space_name
     from lobstr_hw.runtime.wizard.result import document, show
 
     assert person.calibration is not None
-    # the world is the space of the first; nothing is known of others
-    names = ["replay"] if args.sim else [space_name(spec) for spec in args.driver[:1]]
-    spaces = {name: TrackingSpace() for name in names}
-    person.calibration = replace(person.calibration, tracking_spaces=spaces)
+    person.calibration = replace(person.calibration, tracking_spaces=person.spaces)
     save_profile(path, person.calibration)
     if args.json:
         print(json.dumps(document(person, path)))

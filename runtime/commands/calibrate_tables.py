@@ -1,16 +1,17 @@
 """What ``lobstr-calibrate`` shows: the measures, the trackers, and what to make of them."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from rich.table import Table
 
-from lobstr_hw.calibration import Calibration, TPose
+from lobstr_hw.calibration import Calibration, TPose, TrackingSpace
 from lobstr_hw.calibration.movement import Refinement
 from lobstr_hw.calibration.verdict import Grade, findings, verdict
 from lobstr_hw.rotations import Array
 
-__all__ = ["closing_words", "movement_table", "tables"]
+__all__ = ["closing_words", "movement_table", "spaces_table", "tables"]
 
 _STYLES = {Grade.GOOD: "green", Grade.FAIR: "yellow", Grade.POOR: "red"}
 _WORDS = {
@@ -75,6 +76,16 @@ def movement_table(refinement: Refinement) -> Table:
     for q in refinement.quantities:
         better = "" if q.refined else q.missing
         table.add_row(q.name, f"{q.before:.1f} {q.unit}", f"{q.after:.1f} {q.unit}", better)
+    return table
+
+
+def spaces_table(spaces: Mapping[str, TrackingSpace]) -> Table:
+    """How well the parts of the body fit together that different systems track."""
+    table = Table("tracking space", "joined to within", "its stamps", title="Tracking spaces")
+    for i, (name, space) in enumerate(spaces.items()):
+        within = f"{1e3 * space.residual_m:.1f} mm, {np.rad2deg(space.residual_rad):.1f} degrees"
+        late = f"{1e3 * space.delay_s:.0f} ms late"
+        table.add_row(name, *((within, late) if i else ("the world", "")))
     return table
 
 

@@ -9,7 +9,12 @@ from rich.console import Console
 from lobstr_hw.calibration.movement import Refinement
 from lobstr_hw.calibration.verdict import Grade, findings, verdict
 from lobstr_hw.runtime.announcer import Sound, Spoken
-from lobstr_hw.runtime.commands.calibrate_tables import closing_words, movement_table, tables
+from lobstr_hw.runtime.commands.calibrate_tables import (
+    closing_words,
+    movement_table,
+    spaces_table,
+    tables,
+)
 from lobstr_hw.runtime.wizard.stage import Person
 
 __all__ = ["document", "show", "spoken_result"]
@@ -37,6 +42,14 @@ def document(person: Person, path: Path) -> dict[str, Any]:
         "floor_height_m": calibration.floor_m,
         "trackers": {serial: str(role) for serial, role in calibration.roles.items()},
         "residuals": asdict(calibration.residuals),
+        "tracking_spaces": {
+            name: {
+                "residual_m": space.residual_m,
+                "residual_rad": space.residual_rad,
+                "delay_s": space.delay_s,
+            }
+            for name, space in person.spaces.items()
+        },
         "movement": None if person.refinement is None else _movement(person.refinement),
     }
 
@@ -59,6 +72,8 @@ def show(person: Person, path: Path) -> None:
         console.print(table)
     if person.refinement is not None:
         console.print(movement_table(person.refinement))
+    if len(person.spaces) > 1:
+        console.print(spaces_table(person.spaces))
     for line in closing_words(calibration, path):
         console.print(line, soft_wrap=True, highlight=False, markup=False)
 

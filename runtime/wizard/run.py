@@ -33,19 +33,30 @@ class Front(Protocol):
         ...
 
 
-def run_on_log(driver: ReplayDriver, wizard: Wizard, stop: Callable[[], bool]) -> None:
+def run_on_log(
+    log: ReplayDriver,
+    wizard: Wizard,
+    stop: Callable[[], bool],
+    world: TrackerDriver | None = None,
+) -> None:
     """Go through an open log until the wizard is done, or is told to stop.
+
+    Args:
+        log: knows when it is over.
+        wizard: looks at it.
+        stop: asks for the end.
+        world: the same log with its samples in one space; the log itself where None.
 
     Raises:
         CalibrationError: the log ended before it was done; says what was missing.
     """
-    turn = 0
+    driver, turn = world or log, 0
     while not (wizard.done or stop()):
         now_s = turn * LOG_STEP_S
         wizard.add(now_s, driver.poll(now_s), driver.events(), driver.devices())
-        if driver.finished(now_s):
+        if log.finished(now_s):
             wizard.end()
-        if wizard.refused or (driver.finished(now_s) and not wizard.done):
+        if wizard.refused or (log.finished(now_s) and not wizard.done):
             raise wizard.failure()
         turn += 1
 

@@ -1,9 +1,9 @@
 """What every step of the wizard is."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from lobstr_hw.calibration import Calibration, TPose
+from lobstr_hw.calibration import Calibration, TPose, TrackingSpace
 from lobstr_hw.calibration.movement import Refinement
 from lobstr_hw.calibration.self_check import SelfCheck
 from lobstr_hw.errors import CalibrationError
@@ -23,6 +23,7 @@ class Person:
         table: devices and roles.
         stature_m: as typed in; None if not.
         created: when this is, for the profile.
+        spaces: tracking spaces that the trackers are in, by name, for the profile.
         floor_m: of the tracking space.
         t_pose: once it is found.
         calibration: once it is made.
@@ -34,6 +35,7 @@ class Person:
     table: DeviceTable = field(default_factory=DeviceTable)
     stature_m: float | None = None
     created: str = ""
+    spaces: Mapping[str, TrackingSpace] = field(default_factory=dict)
     floor_m: float = 0.0
     t_pose: TPose | None = None
     calibration: Calibration | None = None

@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 from support.two_spaces import Scene, held_together
 
+from lobstr_hw.calibration.alike import ALIKE, most_alike, turning_likeness
 from lobstr_hw.calibration.hand_eye import fit_positions, fit_rotations, wobble
 from lobstr_hw.calibration.spaces import (
+    LEAST_S,
     LEAST_WOBBLE_RAD,
     SpaceAlignment,
     align_spaces,
     turned_so_far,
 )
+from lobstr_hw.calibration.track import Track
 from lobstr_hw.calibration.verdict import Grade
 from lobstr_hw.errors import SpacesNotJoined
 from lobstr_hw.poses import Pose
@@ -160,3 +163,34 @@ def test_the_fits_are_exact_for_any_rotations() -> None:
     got_X, got_Y = fit_positions(R_a, p_a, p_a + R_a @ p_Y - p_X)
     np.testing.assert_allclose(got_X, p_X, atol=1e-12)
     np.testing.assert_allclose(got_Y, p_Y, atol=1e-12)
+
+
+# which trackers are held together
+
+
+def track(scene: Scene, of: str) -> Track:
+    return Track.of(scene.samples_a if of == "a" else scene.samples_b)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_two_that_are_held_together_are_found_among_others(seed: int) -> None:
+    held, others = held_together(seed, delay_s=0.03), held_together(seed + 50)
+    of_a = {"other": track(others, "a"), "held": track(held, "a")}
+    of_b = {"held": track(held, "b"), "another": track(held_together(seed + 90), "b")}
+    found = most_alike(of_a, of_b, LEAST_S, LEAST_WOBBLE_RAD)
+    assert found is not None
+    assert found[:2] == ("held", "held")
+    assert found[2] > ALIKE > turning_likeness(of_a["other"], of_b["held"])[1]
+    delay_s, likeness = turning_likeness(of_a["held"], of_b["held"])
+    assert delay_s == pytest.approx(0.03, abs=0.011)
+    assert likeness == found[2]
+
+
+def test_what_rests_or_was_hardly_seen_is_like_nothing() -> None:
+    moved, rests = held_together(2), held_together(2, turn_rad=0.0)
+    short = held_together(2, seconds=1.5)
+    of_b = {"b": track(moved, "b")}
+    for scene in (rests, short):
+        assert most_alike({"a": track(scene, "a")}, of_b, LEAST_S, LEAST_WOBBLE_RAD) is None
+    assert turning_likeness(track(rests, "a"), track(moved, "b"))[1] == pytest.approx(0.0, abs=0.5)
+    assert most_alike({"a": Track.of([])}, of_b, LEAST_S, LEAST_WOBBLE_RAD) is None

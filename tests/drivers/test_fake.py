@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lobstr_hw.drivers.fake import MOUNTS, SERIALS, T_POSE_S, FakeDriver
+from lobstr_hw.drivers.fake import MOUNTS, OTHER_SPACE, SERIALS, T_POSE_S, FakeDriver
 from lobstr_hw.rotations import Array, rotation_y
 from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint
 from lobstr_hw.trackers import TrackerRole
@@ -49,3 +49,20 @@ def test_devices_face_backwards_as_openvr_has_it() -> None:
 def test_impossible_people_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="must be positive"):
         FakeDriver(**wrong)  # type: ignore[arg-type]
+
+
+def test_some_of_the_devices_in_a_space_of_their_own() -> None:
+    with FakeDriver() as whole, FakeDriver(has="pelvis", apart=1) as belt:
+        there = [s for s in whole.poll(1.0) if s.serial == SERIALS[TrackerRole.PELVIS]]
+        apart = belt.poll(1.0)
+        assert [d.serial for d in belt.devices()] == [SERIALS[TrackerRole.PELVIS]]
+    assert len(apart) == len(there) > 0
+    for a, b in zip(apart, there, strict=True):
+        assert a.T_world_tracker.p is not None and b.T_world_tracker.p is not None
+        back = OTHER_SPACE.inverse().apply(a.T_world_tracker.p)
+        np.testing.assert_allclose(back, b.T_world_tracker.p, atol=2e-3)
+
+
+def test_a_device_that_is_no_role_is_told() -> None:
+    with pytest.raises(ValueError, match=r"'tail' is not one of head"):
+        FakeDriver(has="head+tail")

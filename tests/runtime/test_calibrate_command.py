@@ -3,14 +3,20 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+from support.fake_clock import FakeClock
 from support.motions import arms_down, walking
+from support.two_fakes import two_fakes
 
 from lobstr_hw.calibration import load_profile
+from lobstr_hw.drivers.fake import OTHER_SPACE
 from lobstr_hw.drivers.tracker_log import TrackerLogWriter
 from lobstr_hw.motion import Motion
 from lobstr_hw.runtime.commands.calibrate import main
 from lobstr_hw.runtime.profile_path import default_profile_path
+from lobstr_hw.runtime.recording import Recorder
+from lobstr_hw.runtime.roles import RoleTable
 from lobstr_hw.simulation import SimulatedTake, simulate, take_samples
 from lobstr_hw.trackers import FOUR_POINTS, TrackerRole, TrackingState
 
@@ -199,3 +205,49 @@ def test_a_profile_that_cannot_be_written_is_told(
     blocked.write_text("", encoding="utf-8")
     assert main(["--sim", str(log), "--yes", "--profile", str(blocked / "me.json")]) == 1
     assert "cannot be written" in capsys.readouterr().err
+
+
+# a log of two tracking systems
+
+
+def mixed_log(path: Path, script: str, seconds: float, profile: str = "") -> Path:
+    with two_fakes(script) as driver:
+        writer = TrackerLogWriter(path)
+        if profile:
+            writer.attach_profile(profile.encode())
+        table = RoleTable(None, driver.devices)
+        Recorder(driver, writer, table, FakeClock(0.0), 45.0).run(lambda: False, seconds)
+        writer.close()
+    return path
+
+
+def test_a_log_of_two_systems_is_joined_by_the_movement_in_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, log = tmp_path / "me.json", mixed_log(tmp_path / "mixed.mcap", "join", 31.0)
+    assert main(["--sim", str(log), "--yes", "--profile", str(path)]) == 0
+    assert "Tracking spaces" in capsys.readouterr().out
+    first = load_profile(path)
+    T = first.tracking_spaces["belt"].T_world_space @ OTHER_SPACE
+    np.testing.assert_allclose(T.p, 0.0, atol=2e-3)
+    # once known, the movement need not be in every log
+    text = path.read_text(encoding="utf-8")
+    again, later = tmp_path / "again.json", tmp_path / "later.mcap"
+    mixed_log(later, "calibrate", 20.0, profile=text)
+    assert main(["--sim", str(later), "--yes", "--profile", str(again)]) == 0
+    second = load_profile(again)
+    for name in ("vr", "belt"):
+        a, b = (p.tracking_spaces[name].T_world_space for p in (first, second))
+        np.testing.assert_allclose(a.p, b.p, atol=1e-9)
+    assert second.scale == pytest.approx(first.scale, rel=0.01)
+
+
+def test_a_log_of_two_systems_that_nothing_joins_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, log = tmp_path / "me.json", mixed_log(tmp_path / "apart.mcap", "calibrate", 12.0)
+    assert main(["--sim", str(log), "--yes", "--profile", str(path)]) == 1
+    assert not path.exists()
+    message = capsys.readouterr().err
+    assert "vr and belt are not joined" in message
+    assert "Hold one tracker of each firmly together" in message

@@ -5,16 +5,19 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.beds import need
 from support.terminal_bed import Terminal, in_terminal
 
 from lobstr_hw.calibration import load_profile
+from lobstr_hw.drivers.fake import OTHER_SPACE
 from lobstr_hw.trackers import FOUR_POINTS
 
 pytestmark = pytest.mark.bed
 
 CALIBRATE = "lobstr_hw.runtime.commands.calibrate"
+LIVE = "lobstr_hw.runtime.commands.live"
 BELL = "\a"
 
 
@@ -94,3 +97,32 @@ def test_ctrl_c_ends_cleanly_and_gives_the_terminal_back(tmp_path: Path) -> None
     assert "Traceback" not in terminal.text
     assert "\x1b[?25h" in terminal.text, "the cursor is back"
     assert not path.exists()
+
+
+def test_two_tracking_systems_become_one_body(tmp_path: Path) -> None:
+    path, out = tmp_path / "me.json", tmp_path / "live.ndjson"
+
+    def systems(script: str) -> list[str]:
+        """Headset and controllers of one system, the belt of another, metres and turns away."""
+        options = f"fake:script={script},has="
+        belt = f"{options}pelvis,apart=1,name=belt,role=pelvis"
+        return ["--driver", f"{options}head+left_hand+right_hand", "--driver", belt]
+
+    command = [CALIBRATE, *systems("join"), "--no-speech", "--profile", str(path)]
+    with in_terminal(command) as terminal:
+        terminal.wait_for("Hold the belt tracker and one of fake firmly together")
+        assert terminal.finish(60.0) == 0, terminal.text
+    shows_in_order(terminal, "1/5 Join", "as one", "Joined to within", "good", "2/5 Devices")
+    shows_in_order(terminal, "Calibration is good", "Tracking spaces", "the world", "mm")
+    found = load_profile(path).tracking_spaces["belt"].T_world_space @ OTHER_SPACE
+    assert np.linalg.norm(found.p) < 0.005
+    assert np.abs(found.R - np.eye(3)).max() < 0.005
+
+    live = [LIVE, *systems("calibrate"), "--profile", str(path), "--output", f"ndjson:{out}"]
+    with in_terminal([*live, "--duration", "2", "--no-speech"]) as terminal:
+        assert terminal.finish(30.0) == 0, terminal.text
+    last = json.loads(out.read_text(encoding="utf-8").splitlines()[-1])
+    hips, head = (np.array(last["joints"][joint][:3]) for joint in ("Hips", "Head"))
+    assert hips[1] == pytest.approx(1.0, abs=0.03)
+    assert np.linalg.norm((head - hips)[[0, 2]]) < 0.15, "the hips are under the head"
+    assert last["roles"]["pelvis"] == "ok"
