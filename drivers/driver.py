@@ -26,7 +26,19 @@ BASE_STATION = "base_station"
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
-    """One device of a driver."""
+    """One device of a driver.
+
+    Attributes:
+        serial: names it.
+        kind: headset, controller, tracker, base_station.
+        model: as its maker calls it.
+        role_hint: the body part it says, or was told, it stands for.
+        firmware: its version.
+        battery: 0 to 1, or None: it has none, or does not say.
+        worn: of a headset.
+        stations_in_view: how many base stations it sees now; None: that is not how it is tracked.
+        sensors_hit: how many of its sensors see their light.
+    """
 
     serial: str
     kind: str
@@ -35,6 +47,8 @@ class DeviceInfo:
     firmware: str = ""
     battery: float | None = None
     worn: bool | None = None
+    stations_in_view: int | None = None
+    sensors_hit: int | None = None
 
 
 class EventKind(StrEnum):
@@ -46,11 +60,13 @@ class EventKind(StrEnum):
     BACK = "back"
     RECENTRED = "recentred"
     COMMAND = "command"
+    NOTICE = "notice"
+    """Words for the user: what the driver found out, or what to do."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceEvent:
-    """Something that happened; ``name`` is the button or the command."""
+    """Something that happened; ``name`` is the button, the command, or a notice's words."""
 
     kind: EventKind
     serial: str

@@ -9,12 +9,23 @@ from typing import Protocol
 
 from lobstr_hw.errors import DriverError
 from lobstr_hw.poses import PartialPose
+from lobstr_hw.rotations import Array
 from lobstr_hw.trackers import TrackingState
 
-__all__ = ["Arrival", "Command", "LinkLost", "Lost", "Reading", "ReadingThread", "Source"]
+__all__ = [
+    "Arrival",
+    "Command",
+    "LinkLost",
+    "Lost",
+    "Notice",
+    "Reading",
+    "ReadingThread",
+    "Recentred",
+    "Source",
+]
 
-QUEUE_LENGTH = 512
-"""Half a second of four stations at 240 Hz; the runtime keeps 0.3 s itself."""
+QUEUE_LENGTH = 4096
+"""Two seconds of a headset at 1000 Hz and four devices at 250; the runtime keeps 0.3 s itself."""
 RETRY_S = 0.5
 """How often a lost device is looked for: quick for a person, and nothing for the machine."""
 
@@ -33,6 +44,10 @@ class Reading:
         state: anything but ok and inertial counts as not tracked.
         device_s: the device's own time, or None where it has no clock.
         buttons: those held down, or None: nothing about buttons.
+        velocity: (3,) metres per second in our world, where the device knows it.
+        covariance: (6, 6) of position and rotation in our world, where the device knows it.
+        clock: which of the source's clocks ``device_s`` is of.
+        arrived_s: its ``perf_counter``, where the source knows better than who hands it on.
     """
 
     serial: str
@@ -40,6 +55,10 @@ class Reading:
     state: TrackingState = TrackingState.OK
     device_s: float | None = None
     buttons: frozenset[str] | None = None
+    velocity: Array | None = None
+    covariance: Array | None = None
+    clock: str = ""
+    arrived_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,13 +69,25 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True)
+class Notice:
+    """Words for whoever uses the device: what it found, or what to do."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Recentred:
+    """Where the origin of the world lies has changed."""
+
+
+@dataclass(frozen=True, slots=True)
 class Lost:
     """The device is gone, all trackers with it, or only the named one."""
 
     serial: str | None = None
 
 
-Arrival = Reading | Command | Lost
+Arrival = Reading | Command | Lost | Notice | Recentred
 
 
 class Source(Protocol):
@@ -122,4 +153,5 @@ class ReadingThread:
             self._source = None
 
     def _put(self, arrival: Arrival) -> None:
-        self._arrivals.append((perf_counter(), arrival))
+        known_s = arrival.arrived_s if isinstance(arrival, Reading) else None
+        self._arrivals.append((perf_counter() if known_s is None else known_s, arrival))

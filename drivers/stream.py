@@ -3,7 +3,7 @@
 A new driver says how to connect and what a record means (docs/writing-a-driver.md).
 """
 
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -15,8 +15,11 @@ from lobstr_hw.drivers.reading_thread import (
     Arrival,
     Command,
     LinkLost,
+    Lost,
+    Notice,
     Reading,
     ReadingThread,
+    Recentred,
     Source,
 )
 from lobstr_hw.errors import TrackerNotFound
@@ -36,6 +39,7 @@ class _Tracker:
 
     pose: PartialPose | None = None
     arrived_s: float = 0.0
+    last_s: float = 0.0
     gone: bool = False
     buttons: frozenset[str] = field(default_factory=frozenset)
 
@@ -44,13 +48,14 @@ class StreamDriver(TrackerDriver):
     """A driver whose device sends on its own; a subclass has ``_connect`` and ``_info``.
 
     A device with a clock gives the samples' times (DeviceClock); of one without, a sample has the
-    time at which the reading thread got it.
+    time at which the reading thread got it. A tracker's times never go back; trackers with clocks
+    of their own may be told later one than the other.
     """
 
     def __init__(self) -> None:
         """Nothing is open."""
         self._thread: ReadingThread | None = None
-        self._clock = DeviceClock()
+        self._clocks: defaultdict[str, DeviceClock] = defaultdict(DeviceClock)
         self._trackers: dict[str, _Tracker] = {}
         self._events: list[DeviceEvent] = []
         self._waiting: deque[tuple[float, Arrival]] = deque(maxlen=QUEUE_LENGTH)
@@ -87,12 +92,12 @@ class StreamDriver(TrackerDriver):
         self._lead_s = max(self._lead_s, now_s - perf_counter())
         for arrived_s, what in self._thread.take():
             if isinstance(what, Reading) and what.device_s is not None:
-                self._clock.observe(what.device_s, arrived_s)
+                self._clocks[what.clock].observe(what.device_s, arrived_s)
             self._waiting.append((arrived_s, what))
         samples: list[TrackerSample] = []
         while self._waiting and self._time(*self._waiting[0]) <= now_s:
             samples += self._heard(*self._waiting.popleft())
-        return samples + self._silent()
+        return sorted(samples + self._silent(), key=lambda sample: sample.time_s)  # stable
 
     def devices(self) -> Sequence[DeviceInfo]:
         """The trackers seen since opening."""
@@ -112,7 +117,7 @@ class StreamDriver(TrackerDriver):
         self._begin()
 
     def _begin(self) -> None:
-        self._clock = DeviceClock()
+        self._clocks.clear()
         self._trackers.clear()
         self._events.clear()
         self._waiting.clear()
@@ -121,24 +126,33 @@ class StreamDriver(TrackerDriver):
 
     def _time(self, arrived_s: float, what: Arrival) -> float:
         """When it was measured: no later than it arrived, no earlier than what was given before."""
-        measured_s = arrived_s
-        if isinstance(what, Reading) and what.device_s is not None:
-            measured_s = min(arrived_s, self._clock.host_s(what.device_s))
-        return max(self._last_s, measured_s + self._lead_s)
+        if not isinstance(what, Reading):
+            return max(self._last_s, arrived_s + self._lead_s)
+        measured_s, tracker = arrived_s, self._trackers.get(what.serial)
+        if what.device_s is not None:
+            measured_s = min(arrived_s, self._clocks[what.clock].host_s(what.device_s))
+        return max(0.0 if tracker is None else tracker.last_s, measured_s + self._lead_s)
 
     def _heard(self, arrived_s: float, what: Arrival) -> list[TrackerSample]:
-        self._last_s = time_s = self._time(arrived_s, what)
-        if isinstance(what, Reading):
-            return self._read(what, arrived_s, time_s)
-        if isinstance(what, Command):
-            self._events.append(DeviceEvent(EventKind.COMMAND, "", time_s, what.name))
-            return []
-        serials = self._trackers if what.serial is None else [what.serial]
-        return [sample for serial in serials for sample in self._lose(serial, time_s)]
+        time_s = self._time(arrived_s, what)
+        self._last_s = max(self._last_s, time_s)
+        match what:
+            case Reading():
+                return self._read(what, arrived_s, time_s)
+            case Lost(serial):
+                serials = list(self._trackers) if serial is None else [serial]
+                return [sample for one in serials for sample in self._lose(one, time_s)]
+            case Command(name):
+                self._events.append(DeviceEvent(EventKind.COMMAND, "", time_s, name))
+            case Notice(text):
+                self._events.append(DeviceEvent(EventKind.NOTICE, "", time_s, text))
+            case Recentred():
+                self._events.append(DeviceEvent(EventKind.RECENTRED, "", time_s))
+        return []
 
     def _read(self, reading: Reading, arrived_s: float, time_s: float) -> list[TrackerSample]:
         tracker = self._trackers.setdefault(reading.serial, _Tracker())
-        tracker.arrived_s = arrived_s
+        tracker.arrived_s, tracker.last_s = arrived_s, time_s
         if tracker.gone:
             tracker.gone = False
             self._events.append(DeviceEvent(EventKind.BACK, reading.serial, time_s))
@@ -147,7 +161,12 @@ class StreamDriver(TrackerDriver):
             return []
         tracker.pose = reading.T_world_tracker
         tracked = reading.state in TRACKED
-        return [TrackerSample(reading.serial, tracker.pose, time_s, tracked, reading.state)]
+        return [
+            TrackerSample(
+                reading.serial, tracker.pose, time_s, tracked, reading.state,
+                reading.velocity, reading.covariance,
+            )
+        ]  # fmt: skip
 
     def _press(self, reading: Reading, tracker: _Tracker, time_s: float) -> None:
         if reading.buttons is None:
@@ -172,6 +191,7 @@ class StreamDriver(TrackerDriver):
         if tracker is None or tracker.gone:
             return []
         tracker.gone = True
+        tracker.last_s = time_s = max(time_s, tracker.last_s)
         self._events.append(DeviceEvent(EventKind.GONE, serial, time_s))
         for name in sorted(tracker.buttons):  # nobody can let go of a button that is not there
             self._events.append(DeviceEvent(EventKind.BUTTON_UP, serial, time_s, name))

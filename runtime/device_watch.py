@@ -42,6 +42,8 @@ class DeviceReport:
     firmware: str
     battery: float | None
     worn: bool | None
+    stations_in_view: int | None
+    sensors_hit: int | None
     state: TrackingState | None
 
 

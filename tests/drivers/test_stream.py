@@ -1,6 +1,7 @@
 """Times, losses, buttons: what streaming drivers share, on a clock in the test's hands."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,18 +12,21 @@ from lobstr_hw.drivers import stream
 from lobstr_hw.drivers.device_clock import DeviceClock
 from lobstr_hw.drivers.driver import DeviceInfo, EventKind
 from lobstr_hw.drivers.reading_thread import (
+    QUEUE_LENGTH,
     Arrival,
     Command,
     LinkLost,
     Lost,
+    Notice,
     Reading,
     ReadingThread,
+    Recentred,
     Source,
 )
 from lobstr_hw.drivers.stream import StreamDriver
 from lobstr_hw.errors import TrackerNotFound
 from lobstr_hw.poses import PartialPose
-from lobstr_hw.trackers import TrackingState
+from lobstr_hw.trackers import TrackerSample, TrackingState
 
 PERF_S = 5000.0
 """What perf_counter says at time 0 of the session: nothing to do with it."""
@@ -53,6 +57,11 @@ class Bench(StreamDriver):
     def hear(self, at_s: float, what: Arrival) -> None:
         assert isinstance(self._thread, HandFed)
         self._thread.arrivals.append((PERF_S + at_s, what))
+
+    def at(self, now_s: float) -> Sequence[TrackerSample]:
+        """Poll at the nominal time."""
+        self.perf_s = PERF_S + now_s
+        return self.poll(now_s)
 
     def tick(self, now_s: float, late_s: float = 0.0) -> list[float]:
         """Poll at the nominal time, so much too late; the samples' times."""
@@ -211,6 +220,42 @@ def test_a_queue_that_nobody_empties_drops_its_oldest() -> None:
         pass
     thread.close()
     times = [what.device_s for _, what in thread.take() if isinstance(what, Reading)]
-    assert len(times) == 511  # 512 with the Lost of closing
+    assert len(times) == QUEUE_LENGTH - 1  # and the Lost of closing
     assert times[-1] == source.reads * 100 + 99
     np.testing.assert_array_equal(np.diff(np.array(times, dtype=float)), 1.0)
+
+
+def test_every_clock_is_mapped_by_itself_and_samples_are_sorted_by_time(bench: Bench) -> None:
+    told = [replace(reading(t, serial), clock=serial) for t, serial in ((5.0, "A"), (900.0, "B"))]
+    bench.hear(0.1, told[0])
+    bench.hear(0.1, told[1])
+    bench.hear(0.2, replace(told[0], device_s=5.1))
+    bench.hear(0.21, replace(told[1], device_s=900.05))
+    samples = bench.at(1.0)
+    assert [s.serial for s in samples] == ["A", "B", "B", "A"]
+    np.testing.assert_allclose([s.time_s for s in samples], [0.1, 0.1, 0.15, 0.2], atol=1e-9)
+
+
+def test_a_slow_tracker_keeps_its_times_beside_a_quick_one(bench: Bench) -> None:
+    bench.hear(0.10, replace(reading(1.0, "slow"), clock="slow"))
+    bench.hear(0.30, replace(reading(1.0, "quick"), clock="quick"))
+    bench.at(0.31)
+    bench.hear(0.32, replace(reading(1.1, "slow"), clock="slow"))
+    [late] = bench.at(0.4)
+    assert late.time_s == pytest.approx(0.2), "its own time, though older than what was given"
+
+
+def test_words_for_the_user_and_a_moved_origin_are_events(bench: Bench) -> None:
+    bench.hear(0.1, Notice("a base station was moved"))
+    bench.hear(0.2, Recentred())
+    assert not bench.at(1.0)
+    kinds = [(event.kind, event.name) for event in bench.events()]
+    assert kinds == [(EventKind.NOTICE, "a base station was moved"), (EventKind.RECENTRED, "")]
+
+
+def test_velocity_and_covariance_are_handed_on(bench: Bench) -> None:
+    v, P = np.arange(3.0), np.eye(6)
+    bench.hear(0.1, replace(reading(), velocity=v, covariance=P))
+    [sample] = bench.at(1.0)
+    assert sample.velocity is v
+    assert sample.covariance is P
