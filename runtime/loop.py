@@ -10,7 +10,9 @@ from lobstr_hw.runtime.ticks import Tick
 from lobstr_hw.skeleton_pose import SkeletonPose
 from lobstr_hw.trackers import TrackerSample
 
-__all__ = ["run"]
+__all__ = ["run", "take_in"]
+
+Control = Callable[[Tick, Sequence[TrackerSample]], None]
 
 
 def run(
@@ -20,7 +22,7 @@ def run(
     outputs: Sequence[Output],
     ticks: Iterable[Tick],
     observe: Callable[[Tick, SkeletonPose], None],
-    control: Callable[[Tick, Sequence[TrackerSample]], None] | None = None,
+    control: Control | None = None,
 ) -> None:
     """Trackers -> reference frame -> velocity -> GRU -> contact IK -> outputs.
 
@@ -34,15 +36,28 @@ def run(
         control: obeys the user's gestures before the body is made.
     """
     for tick in ticks:
-        samples = driver.poll(tick.time_s)
-        feed.add(samples)
-        if session.calibrate(samples):
-            feed.table.bind(session.roles)
-            for output in outputs:
-                output.calibrated(session.body)
-        if control is not None:
-            control(tick, samples)
+        samples = take_in(tick, driver, feed, session, outputs, control)
         pose = session.step(tick, feed)
         for output in outputs:
             output.send(pose, samples)
         observe(tick, pose)
+
+
+def take_in(
+    tick: Tick,
+    driver: TrackerDriver,
+    feed: Feed,
+    session: Session,
+    outputs: Sequence[Output] = (),
+    control: Control | None = None,
+) -> Sequence[TrackerSample]:
+    """What a tick brings, up to the body: samples, the first calibration, gestures."""
+    samples = driver.poll(tick.time_s)
+    feed.add(samples)
+    if session.calibrate(samples):
+        feed.table.bind(session.roles)
+        for output in outputs:
+            output.calibrated(session.body)
+    if control is not None:
+        control(tick, samples)
+    return samples

@@ -1,7 +1,7 @@
 """One user's session: calibrated once, then a body every tick."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,16 +9,17 @@ from lobstr_hw.avatar import Avatar
 from lobstr_hw.calibration.calibration import Calibration
 from lobstr_hw.errors import CalibrationError
 from lobstr_hw.predictors.predictor import Frame, Predictor, State
+from lobstr_hw.rotations import Array
 from lobstr_hw.runtime.changing import Change
 from lobstr_hw.runtime.feed import Feed
 from lobstr_hw.runtime.presenting import Presentation
 from lobstr_hw.runtime.standing import standing_pose
 from lobstr_hw.runtime.ticks import Tick
 from lobstr_hw.skeleton import Body
-from lobstr_hw.skeleton_pose import SkeletonPose
+from lobstr_hw.skeleton_pose import RoleReport, SkeletonPose
 from lobstr_hw.trackers import TrackerRole, TrackerSample
 
-__all__ = ["Session"]
+__all__ = ["Session", "Sight"]
 
 Watcher = Callable[[Sequence[TrackerSample]], Calibration | None]
 """Shown the samples of every tick until it finds a calibration in them."""
@@ -26,6 +27,25 @@ Watcher = Callable[[Sequence[TrackerSample]], Calibration | None]
 
 RESTART_AFTER_S = 0.2
 """A state that has given nothing finite for so long is given up."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """What a session sees at a tick.
+
+    Attributes:
+        time_s: of the tick.
+        roles: how the trackers fare.
+        frame: joint poses at that time; None while there is no calibrated user in sight.
+        grid: joint poses at the grid times due by it, oldest first.
+        p_head: (3,) of the headset while there is no frame; None before it was seen.
+    """
+
+    time_s: float
+    roles: dict[TrackerRole, RoleReport]
+    frame: Frame | None = None
+    grid: tuple[Frame, ...] = ()
+    p_head: Array | None = None
 
 
 class Session:
@@ -129,13 +149,23 @@ class Session:
 
     def step(self, tick: Tick, feed: Feed) -> SkeletonPose:
         """The body at a tick: standing still until the user is calibrated and seen."""
+        return self.show(self.look(tick, feed))
+
+    def look(self, tick: Tick, feed: Feed) -> Sight:
+        """What is seen of the user at a tick, by the calibration of that time."""
         roles = feed.report(tick.time_s)
         calibration = self._changed(tick.time_s)
         if calibration is None or not feed.seen(self.predictor.card.needs):
-            return standing_pose(tick.time_s, feed.head(tick.time_s), self.body, roles)
+            return Sight(tick.time_s, roles, p_head=feed.head(tick.time_s))
         frame, *grid = self._frames(calibration, tick, feed)
-        state, pose = self._avatar.step(self._state, frame, grid)
-        pose = self._finite(state, replace(pose, roles=roles))
+        return Sight(tick.time_s, roles, frame, tuple(grid))
+
+    def show(self, sight: Sight) -> SkeletonPose:
+        """The body of what was seen; each sight once, in order."""
+        if sight.frame is None:
+            return standing_pose(sight.time_s, sight.p_head, self.body, sight.roles)
+        state, pose = self._avatar.step(self._state, sight.frame, sight.grid)
+        pose = self._finite(state, replace(pose, roles=sight.roles))
         return self.presentation.show(pose, self.body)
 
     def _frames(self, calibration: Calibration, tick: Tick, feed: Feed) -> list[Frame]:

@@ -1,6 +1,7 @@
 """LoBSTR: the lower body from four points, by a GRU stepped once per grid time."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -107,9 +108,7 @@ def _state_after(
     }
 
 
-def prediction_from_6d(
-    pose: npt.NDArray[np.float32], logits: npt.NDArray[np.float32]
-) -> Prediction:
+def prediction_from_6d(pose: npt.NDArray[Any], logits: npt.NDArray[Any]) -> Prediction:
     """The network's numbers (n, 48) and (n, 4) as rotations and probabilities."""
     joints = pose_from_6d(pose.astype(np.float64))  # (n, 2, 4, 3, 3): C, U, L, F
     C = joints[:, :, 0]
@@ -119,7 +118,7 @@ def prediction_from_6d(
     )
 
 
-def softmax_contact(logits: npt.NDArray[np.float32]) -> Array:
+def softmax_contact(logits: npt.NDArray[Any]) -> Array:
     """Logits (n, 4): (off, on) of the left foot, then of the right -> probability of on (n, 2)."""
     off_on = logits.astype(np.float64).reshape(-1, 2, 2)
     # a softmax of two is a logistic of their difference; tanh does not overflow

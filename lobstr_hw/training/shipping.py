@@ -17,14 +17,20 @@ from lobstr_hw.training.checkpoint import Run, load_checkpoint
 from lobstr_hw.training.config import Recipe, TrainingConfig, read_config
 from lobstr_hw.training.dataset import RATE_HZ
 from lobstr_hw.training.export import ExportError, export_network
+from lobstr_hw.training.export_two_way import export_two_way
 from lobstr_hw.training.loop import VALIDATION_COLUMNS
-from lobstr_hw.training.network import parameter_count
+from lobstr_hw.training.network import LobstrNetwork, parameter_count
 from lobstr_hw.training.sources import notices
+from lobstr_hw.training.two_way_network import TwoWayNetwork
 
 __all__ = ["export_run", "network_card"]
 
 MODEL_VERSION = "1"
-NAMES: dict[Recipe, str] = {"carried": "lobstr", "paper": "lobstr-paper"}
+NAMES: dict[Recipe, str] = {
+    "carried": "lobstr",
+    "paper": "lobstr-paper",
+    "two-way": "lobstr-two-way",
+}
 """Of the predictor that a recipe's weights make."""
 
 
@@ -47,11 +53,12 @@ def network_card(run: Run, config: TrainingConfig, details: dict[str, Any]) -> N
     return NetworkCard(
         model,
         config.feature_form,
-        config.hidden_size,
+        run.network.state_size,
         stats.input_mean,
         stats.input_scale,
         stats.output_mean,
         stats.contact_mean,
+        kind="recording" if config.recipe == "two-way" else "live",
     )
 
 
@@ -75,7 +82,7 @@ def export_run(folder: Path, out: Path, metrics: Mapping[str, Path] | None = Non
         run.network.load_state_dict(run.best)
     details = {
         "recipe": config.recipe,
-        "architecture": f"GRU {config.hidden_size}, Linear 128 + ReLU, heads 48 and 4",
+        "architecture": _architecture(config),
         "parameters": parameter_count(run.network),
         "steps_done": run.step,
         "steps_planned": config.steps,
@@ -86,10 +93,23 @@ def export_run(folder: Path, out: Path, metrics: Mapping[str, Path] | None = Non
         "configuration": asdict(config),
         "metrics": {k: _read_json(p).get("all", {}) for k, p in (metrics or {}).items()},
     }
-    error = export_network(run.network, network_card(run, config, details), out)
+    error = _write(run.network, network_card(run, config, details), out)
     details["float16_storage_error"] = asdict(error)
     write_card(out.with_suffix(".json"), network_card(run, config, details))
     return error
+
+
+def _write(network: LobstrNetwork, card: NetworkCard, out: Path) -> ExportError:
+    if isinstance(network, TwoWayNetwork):
+        return export_two_way(network, card, out)
+    return export_network(network, card, out)
+
+
+def _architecture(config: TrainingConfig) -> str:
+    encoder = f"{config.network.upper()} {config.hidden_size}"
+    if config.recipe == "two-way":
+        encoder = f"two-way {encoder} + {config.hidden_size}"
+    return f"{encoder}, Linear 128 + ReLU, heads 48 and 4"
 
 
 def _validation(run: Run) -> dict[str, float]:

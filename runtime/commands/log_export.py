@@ -2,24 +2,28 @@
 
 import argparse
 import csv
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
 from lobstr_hw.drivers.tracker_log import TrackerLog, read_log
-from lobstr_hw.runtime.commands.log_bodies import Bodies, bodies_of
+from lobstr_hw.runtime.commands.log_bodies import bodies_of
 from lobstr_hw.runtime.commands.log_report import Report, Step, Subparsers, progress_bar, whole_file
 from lobstr_hw.runtime.outputs.bvh import BvhOutput
 from lobstr_hw.runtime.outputs.ndjson import NdjsonOutput
 from lobstr_hw.runtime.outputs.output import Output
+from lobstr_hw.skeleton import Body
+from lobstr_hw.skeleton_pose import SkeletonPose
 
 __all__ = ["CSV_COLUMNS", "add_parser", "run", "write_csv"]
 
 CSV_COLUMNS = (
     "time_s", "serial", "role", "px", "py", "pz", "qx", "qy", "qz", "qw", "tracked",
 )  # fmt: skip
+STEP_EVERY = 45
 
 
 def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
@@ -28,14 +32,24 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
         "export",
         help="CSV of the samples; BVH or NDJSON of the body",
         description="--csv writes one row per sample. --bvh and --ndjson write the skeleton that "
-        "was recorded with the trackers, or else the truth of a made log.",
-        epilog="example: lobstr-log export take.mcap --csv take.csv",
+        "was recorded with the trackers, or else the truth of a made log; with --refine they "
+        "write a body that is worked out anew from the trackers, its legs by the network that "
+        "knows what comes next.",
+        epilog="examples: lobstr-log export take.mcap --csv take.csv; "
+        "lobstr-log export take.mcap --bvh take.bvh --refine",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="a tracker log")
     target = parser.add_mutually_exclusive_group(required=True)
     for name in ("csv", "bvh", "ndjson"):
         target.add_argument(f"--{name}", type=Path, metavar="OUT")
     target.add_argument("--gltf", type=_not_yet, metavar="OUT", help="not in this version")
+    parser.add_argument(
+        "--refine", action="store_true", help="the legs anew, past and future known (docs/refining)"
+    )
+    parser.add_argument(
+        "--profile", type=Path, metavar="FILE", help="with --refine: calibration (the log's own)"
+    )
+    parser.set_defaults(wrong_use=parser.error)
     return parser
 
 
@@ -47,6 +61,14 @@ def _not_yet(text: str) -> Path:
 
 def run(options: argparse.Namespace) -> Report:
     """Write the file asked for."""
+    if options.refine and options.csv:
+        options.wrong_use("--refine makes bodies: give --bvh or --ndjson")
+    if options.profile and not options.refine:
+        options.wrong_use("--profile goes with --refine only: nothing else needs a calibration")
+    return _refine(options) if options.refine else _export(options)
+
+
+def _export(options: argparse.Namespace) -> Report:
     with progress_bar("reading the log") as step:
         log = read_log(options.file)
         if options.csv:
@@ -54,13 +76,12 @@ def run(options: argparse.Namespace) -> Report:
             with whole_file(target) as part:
                 rows = _csv_file(log, part, step)
         else:
-            kind, target = ("bvh", options.bvh) if options.bvh else ("ndjson", options.ndjson)
-            make: Callable[[Path], Output] = (
-                BvhOutput if options.bvh else lambda part: NdjsonOutput(str(part))
-            )
+            kind, target = _body_file(options)
             bodies = bodies_of(log)
+            poses = (bodies.pose(i) for i in range(len(bodies)))
             with whole_file(target) as part:
-                rows = _play(bodies, make(part), step)
+                output = _output(kind, part)
+                rows = _play(poses, bodies.body, bodies.rate_hz, output, step, len(bodies))
     document = {"file": str(target), "kind": kind, "rows": rows, "damage": log.damage or None}
     cut = f"; the log is cut: {log.damage}" if log.cut else ""
     return Report(f"{target}: {rows} {'samples' if options.csv else 'frames'}{cut}", document)
@@ -94,14 +115,59 @@ def write_csv(log: TrackerLog, file: TextIO, step: Callable[[float, float], None
     return len(order)
 
 
-def _play(bodies: Bodies, output: Output, step: Step) -> int:
-    """Send bodies to an output as the live program would."""
-    output.open(bodies.body, bodies.rate_hz, "export")
+def _play(
+    poses: Iterable[SkeletonPose],
+    body: Body,
+    rate_hz: float,
+    output: Output,
+    step: Step,
+    total: int,
+) -> int:
+    """Send bodies to an output as the live program would; returns how many there were."""
+    output.open(body, rate_hz, "export")
+    sent = 0
     try:
-        output.calibrated(bodies.body)
-        for i in range(len(bodies)):
-            output.send(bodies.pose(i), ())
-            step(i, len(bodies))
+        output.calibrated(body)
+        for pose in poses:
+            output.send(pose, ())
+            sent += 1
+            if sent % STEP_EVERY == 0:
+                step(sent, total)
     finally:
         output.close()
-    return len(bodies)
+    return sent
+
+
+def _body_file(options: argparse.Namespace) -> tuple[str, Path]:
+    """What kind, and which file."""
+    return ("bvh", options.bvh) if options.bvh else ("ndjson", options.ndjson)
+
+
+def _output(kind: str, path: Path) -> Output:
+    return BvhOutput(path) if kind == "bvh" else NdjsonOutput(str(path))
+
+
+def _refine(options: argparse.Namespace) -> Report:
+    # imported here: the engine takes a while to load, and no other export needs it
+    from lobstr_hw.runtime.refining import refined_poses, seen_in
+
+    kind, target = _body_file(options)
+    with progress_bar("playing the log") as step, whole_file(target) as part:
+        recording = seen_in(options.file, options.profile, _tell, step)
+        step(0, None, "the legs")
+        poses = refined_poses(recording)
+        step(0, len(recording.moments), "the body")
+        rows = _play(
+            poses,
+            recording.body,
+            recording.options.rate_hz,
+            _output(kind, part),
+            step,
+            len(recording.moments),
+        )
+    document = {"file": str(target), "kind": kind, "rows": rows, "refined": True}
+    return Report(f"{target}: {rows} frames, the legs refined", document)
+
+
+def _tell(message: str) -> None:
+    print(f"lobstr-log export: {message}", file=sys.stderr)
