@@ -158,12 +158,12 @@ class Transfer:
 
 def usbfs_handler(base: Any, device: BedDevice) -> Any:
     """What answers the ioctls of a device's usbfs file."""
-    pending: list[Transfer] = []
+    pending: dict[Any, list[Transfer]] = {}  # each open file has its own
 
-    def reap(client: Any) -> None:
-        for transfer in pending:
+    def reap(client: Any, transfers: list[Transfer]) -> None:
+        for transfer in transfers:
             if transfer.try_finish(device):
-                pending.remove(transfer)
+                transfers.remove(transfer)
                 client.get_arg().resolve(0, 8).set_ptr(0, transfer.block)
                 client.complete(0, 0)
                 return
@@ -176,14 +176,15 @@ def usbfs_handler(base: Any, device: BedDevice) -> Any:
             size, kind, number = request >> 16 & 0x3FFF, request >> 8 & 0xFF, request & 0xFF
             if kind != ord("U"):
                 return False
+            transfers = pending.setdefault(client, [])
             if number == 26:
                 client.get_arg().resolve(0, 4).update(0, list(struct.pack("<I", CAPABILITIES)))
                 client.complete(0, 0)
             elif number in (12, 13):
-                reap(client)
+                reap(client, transfers)
             elif number == 11:  # libusb gives up what it asked for
                 given_up = identity(client.get_arg().resolve(0, URB_BYTES))
-                for transfer in pending:
+                for transfer in transfers:
                     transfer.cancelled |= transfer.identity == given_up
                 client.complete(0, 0)
             elif number == 8:
@@ -191,7 +192,7 @@ def usbfs_handler(base: Any, device: BedDevice) -> Any:
             elif not device.plugged:
                 client.complete(-1, errno.ENODEV)
             elif number == 10:
-                pending.append(Transfer(client.get_arg().resolve(0, size)))
+                transfers.append(Transfer(client.get_arg().resolve(0, size)))
                 client.complete(0, 0)
             elif number == 21:
                 device.halted.clear()
@@ -201,6 +202,9 @@ def usbfs_handler(base: Any, device: BedDevice) -> Any:
             else:
                 return False
             return True
+
+        def do_client_vanished(self, client: Any) -> None:
+            pending.pop(client, None)
 
     return Handler()
 
@@ -282,13 +286,14 @@ class Bus:
             reader = os.open(path, os.O_RDWR | os.O_NONBLOCK | getattr(os, "O_NOCTTY", 0))
             lines.append((self.bed.get_dev_fd(node), reader))
         device.plug(lines)
-        for path in self._paths[number]:
-            self.bed.uevent(path, "add")
+        self.bed.uevent(f"/sys{place.syspath}", "add")
 
     def unplug(self, number: int) -> None:
-        self.devices[number].unplug()
-        for path in reversed(self._paths.pop(number)):
-            self.bed.uevent(path, "remove")
+        paths = self._paths.pop(number, [])
+        if paths:
+            self.devices[number].unplug()
+            self.bed.uevent(paths[0], "remove")  # of the device only: listeners keep but a few
+        for path in reversed(paths):
             self.bed.remove_device(path)
 
     def _attach(self, node: str, handler: Any) -> None:

@@ -30,7 +30,7 @@ def run_in_bed(bed: str, arguments: Sequence[str], tests: Path) -> None:
         [str(SYSTEM_PYTHON), str(SUPPORT / bed), *arguments, *inner, str(tests)],
         capture_output=True,
         text=True,
-        timeout=150,
+        timeout=600,
     )
     if done.returncode:
         pytest.fail(done.stdout + done.stderr, pytrace=False)
