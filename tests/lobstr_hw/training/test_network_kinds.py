@@ -196,3 +196,22 @@ def test_a_loss_that_is_left_out_has_no_gradient(clips: Clips) -> None:
         ends.append(go_on(started(clips, config), clips, config))
     assert not same_weights(ends[0], ends[1])
     assert not same_weights(ends[1], ends[2])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_said_of_a_row_of_windows_is_what_is_said_of_each(
+    clips: Clips, kind: NetworkKind
+) -> None:
+    from lobstr_hw.training.windowed import windowed
+
+    config = replace(SMALL, network=kind)
+    run = started(clips, config)
+    x = np.random.default_rng(2).standard_normal((40, 37))
+    said = windowed(run, config, x, 20, 40)
+    assert said.pose.shape == (20, 48)
+    for i in (20, 33, 39):
+        window = (x[i - 15 : i + 1] - run.stats.input_mean) / run.stats.input_scale
+        with torch.no_grad():
+            pose, logits, _ = run.network(torch.from_numpy(window.astype(np.float32))[None])
+        assert said.pose[i - 20] == pytest.approx(pose[0].numpy(), rel=1e-4, abs=1e-4)
+        assert said.logits[i - 20] == pytest.approx(logits[0].numpy(), rel=1e-4, abs=1e-4)
