@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 from lobstr_hw.drivers.lighthouse.angles import DeviceModel
+from lobstr_hw.drivers.lighthouse.capture_clock import CaptureClock
 from lobstr_hw.drivers.lighthouse.device_config import inflate_config, join_pieces, parse_config
 from lobstr_hw.drivers.lighthouse.device_reader import OLD_RADIO, DeviceReader
 from lobstr_hw.drivers.lighthouse.imu import ImuRanges, parse_ranges
@@ -28,7 +29,9 @@ class CapturedDevice:
         model: from the configuration that the capture saw being read, or None.
         ranges: of the IMU, or None: the capture did not see them being asked for.
         reader: what the device says.
+        clock: its time beside the capture's.
         problem: what was wrong with the configuration, or empty.
+        unread: reports of a dongle that were left alone.
     """
 
     def __init__(self, model: DeviceModel | None = None) -> None:
@@ -37,7 +40,8 @@ class CapturedDevice:
         self.ranges: ImuRanges | None = None
         old_radio = model is not None and model.product_id in OLD_RADIO
         self.reader = DeviceReader(old_radio, gen2_light=False)
-        self.problem = ""
+        self.clock = CaptureClock()
+        self.problem, self.unread = "", 0
         self._pieces: list[bytes] = []
 
     def feed(self, report: UsbReport) -> None:
@@ -45,11 +49,20 @@ class CapturedDevice:
         match report.kind:
             case ReportKind.INPUT:
                 if self.model is not None or report.data[0] not in RADIO_REPORTS:
-                    self.reader.feed(report.data)
+                    self._hear(report)
+                else:
+                    self.unread += 1
             case ReportKind.FEATURE_GET:
                 self._answered(report.data)
             case ReportKind.FEATURE_SET:
                 self._told(report.data)
+
+    def _hear(self, report: UsbReport) -> None:
+        before = self.reader.newest_tick
+        self.reader.feed(report.data)
+        newest = self.reader.newest_tick
+        if newest is not None and newest != before:
+            self.clock.observe(newest, report.time_s)
 
     def _answered(self, data: bytes) -> None:
         if data[0] == RANGES:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import IO
 
 from lobstr_hw.drivers.lighthouse.angles import DeviceModel
+from lobstr_hw.drivers.lighthouse.capture_clock import CaptureClock
 from lobstr_hw.drivers.lighthouse.capture_stream import LONGEST, open_capture
 from lobstr_hw.drivers.lighthouse.device_config import parse_config
 from lobstr_hw.drivers.lighthouse.imu import ImuRanges, parse_ranges
@@ -40,6 +41,7 @@ class RecordedDevice:
         ranges: of its IMU, or None: not told.
         lists: its events.
         problem: what was wrong with its configuration, or empty.
+        clock: its time beside the recording's.
     """
 
     model: DeviceModel | None = None
@@ -47,8 +49,9 @@ class RecordedDevice:
     lists: EventLists = field(default_factory=EventLists)
     problem: str = ""
     ticks: Ticks = field(default_factory=Ticks)
+    clock: CaptureClock = field(default_factory=CaptureClock)
 
-    def read(self, what: str, fields: str) -> None:
+    def read(self, time_s: float, what: str, fields: str) -> None:
         """One line; ValueError, IndexError: it is damaged."""
         if what == "CONFIG":
             self._configure(fields)
@@ -60,7 +63,7 @@ class RecordedDevice:
             case "IMU_SCALES":
                 self.ranges = parse_ranges(bytes([RANGES, numbers[0] & 0xFF, numbers[1] & 0xFF]))
             case "i":
-                self._imu(numbers)
+                self._imu(time_s, numbers)
             case _:
                 self._light(what, numbers)
 
@@ -70,11 +73,13 @@ class RecordedDevice:
         except FileFormatError as error:
             self.problem = str(error)
 
-    def _imu(self, numbers: list[int]) -> None:
+    def _imu(self, time_s: float, numbers: list[int]) -> None:
         _, time, *counts = numbers
         if len(counts) != COUNTS or max(map(abs, counts)) > LARGEST:
             raise ValueError(f"six counts of an IMU are not {counts}")
-        self.lists.imu.append((self.ticks.imu(time & 0xFFFFFFFF), *counts))
+        ticks = self.ticks.imu(time & 0xFFFFFFFF)
+        self.lists.imu.append((ticks, *counts))
+        self.clock.observe(ticks, time_s)
 
     def _light(self, what: str, numbers: list[int]) -> None:
         time = numbers[1 if what in "CY" else 2]
@@ -104,7 +109,7 @@ def read_survive_text(path: Path) -> dict[str, RecordedDevice]:
             if len(parts) < 4 or (parts[1] not in devices and len(devices) >= MOST_DEVICES):
                 continue
             try:
-                devices.setdefault(parts[1], RecordedDevice()).read(parts[2], parts[3])
+                devices.setdefault(parts[1], RecordedDevice()).read(_seconds(parts[0]), *parts[2:])
             except (ValueError, IndexError, OverflowError):
                 continue  # the last line of a cut file, or a damaged one
     found = {name: d for name, d in devices.items() if d.model or d.lists.imu}
@@ -125,6 +130,13 @@ def _lines(stream: IO[bytes]) -> Iterator[str]:
         yield from (line.decode("utf-8", "replace") for line in lines)
         if not chunk or len(rest) > LONGEST:
             return
+
+
+def _seconds(text: str) -> float:
+    time_s = float(text)
+    if not abs(time_s) < LARGEST:
+        raise ValueError(f"{text} is no time")
+    return time_s
 
 
 def _whole(text: str) -> int:

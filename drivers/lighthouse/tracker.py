@@ -1,11 +1,11 @@
 """From one device's angles and IMU samples to poses, one for every IMU sample.
 
 State in, state out. All steps are taken at fixed places of the device's own time: light is used in
-windows of 8 ms, each once the IMU has come 10 ms further (a sweep is known only at its end, and
+windows of 8 ms, each once the IMU has come 30 ms further (a sweep is known only at its end, and
 light and IMU come by different ways). So poses do not depend on when a packet arrived.
 
     windows of light   |----E-8ms----|----E----|----E+8ms----|
-    IMU sample at t    its pose: the state at E, dead reckoned to t, for E + 10 ms < t <= E + 18 ms
+    IMU sample at t    its pose: the state at E, dead reckoned to t, for E + 30 ms < t <= E + 38 ms
 """
 
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ from lobstr_hw.drivers.lighthouse.kalman import (
     covariances,
 )
 from lobstr_hw.drivers.lighthouse.light import Stations, join_angles, take_angles
-from lobstr_hw.drivers.lighthouse.reacquire import reacquire
+from lobstr_hw.drivers.lighthouse.reacquire import reacquire, second_look
 from lobstr_hw.drivers.lighthouse.rest import is_still, rest_gyro
 from lobstr_hw.drivers.lighthouse.tracker_state import (
     Fix,
@@ -33,6 +33,11 @@ from lobstr_hw.drivers.lighthouse.tracker_state import (
     begin,
     join_poses,
 )
+
+FADES = 0.8
+"""What hits of a window count for in the next: some 40 ms are remembered."""
+TRUE_SHARE, TRIAL_WINDOWS = 0.7, 3
+"""Of the hits that a pose on trial must agree with; windows in a row that end the trial."""
 
 __all__ = ["Fix", "PoseBatch", "TrackerSettings", "TrackerState", "begin", "join_poses", "step"]
 
@@ -129,7 +134,7 @@ def _give(
 ) -> tuple[TrackerState, PoseBatch]:
     """The poses of samples not given yet, up to a moment."""
     f = state.filter
-    if f is None:
+    if f is None or (state.lost and state.place is None):
         return replace(state, given=max(state.given, until)), join_poses([])
     nodes, skip = _nodes(state.imu, f.ticks, until, max(state.given, f.ticks))
     if skip >= len(nodes):
@@ -146,7 +151,8 @@ def _give(
     if len(lost):
         fix[lost] = Fix.LOST
         p, v = p.copy(), v.copy()
-        p[lost], v[lost] = (f.p if state.lost or lost[0] == 0 else p[lost[0] - 1]), 0.0
+        before = f.p if lost[0] == 0 else p[lost[0] - 1]
+        p[lost], v[lost] = state.place if state.lost else before, 0.0
     P = covariances(f, track, settings.filter, settings.filter.rest_calm if state.still else 1.0)
     batch = PoseBatch(nodes[skip:], p, v, track.R[skip:], track.gyro[skip:], P[skip:], fix)
     return replace(state, given=int(nodes[-1])), batch
@@ -160,9 +166,18 @@ def _window(
     state = replace(state, window_end=end, still=is_still(state, end, settings))
     if state.filter is not None:
         state = _filter_window(state, state.filter, end, model, stations, settings)
-    if state.lost:
+    if state.lost and not state.on_trial:
         state = reacquire(state, end, model, stations, settings)
+    elif _is_doubtful(state, end, settings):
+        state = second_look(state, end, model, stations, settings)
     return _forget(state, end, settings)
+
+
+def _is_doubtful(state: TrackerState, end: int, settings: TrackerSettings) -> bool:
+    """Too few of the latest hits are believed, and nobody looked for another pose lately."""
+    few = state.believed < settings.doubt_share * state.seen
+    rested = end - state.looked > settings.doubt_s * TICKS_PER_S
+    return few and rested and state.seen > settings.doubt_hits and not state.lost
 
 
 def _filter_window(
@@ -177,7 +192,7 @@ def _filter_window(
     if nodes[-1] != end:
         nodes = np.append(nodes, end)
     track = _reckon(state, f, nodes)
-    if state.lost:
+    if state.lost and not state.on_trial:
         return replace(state, filter=_turn_only(f, track))
     calm = settings.filter.rest_calm if state.still else 1.0
     now = advance(f, track, settings.filter, calm)
@@ -186,7 +201,12 @@ def _filter_window(
         window = take_angles(state.angles, slice(int(i), int(j)))
         now, report = correct_with_light(now, track, window, model, stations, settings.filter)
         fits = 2 * report.used >= report.hits
-        state = replace(state, disagreed=0 if fits else state.disagreed + 1)
+        state = replace(
+            state,
+            disagreed=0 if fits else state.disagreed + 1,
+            seen=FADES * state.seen + report.hits,
+            believed=FADES * state.believed + report.used,
+        )
         if report.used >= 2 and fits:
             state = replace(state, light=int(window.ticks[-1]), rms_rad=report.rms_rad)
     if state.still:
@@ -198,13 +218,23 @@ def _judge(
     state: TrackerState, before: FilterState, now: FilterState, end: int, settings: TrackerSettings
 ) -> TrackerState:
     """Lost when too long without light, too unsure, or light keeps disagreeing."""
+    variance = np.trace(now.P[:3, :3])
     dark = end - state.light > settings.lost_s * TICKS_PER_S
-    unsure = np.trace(now.P[:3, :3]) > settings.lost_sigma_m**2
-    if not (dark or unsure or state.disagreed >= settings.disagree_windows):
+    if state.on_trial:
+        sure = variance < settings.trial_sigma_m**2 and state.believed > settings.trial_hits
+        if sure and state.believed > TRUE_SHARE * state.seen:
+            return replace(state, lost=False, on_trial=False)
+        if not dark and state.disagreed < TRIAL_WINDOWS:
+            return state
+    elif not (
+        dark or variance > settings.lost_sigma_m**2 or state.disagreed >= settings.disagree_windows
+    ):
         return state
     return replace(
         state,
         lost=True,
+        on_trial=False,
+        place=state.place if state.lost else before.p,
         disagreed=0,
         filter=replace(now, p=before.p, v=np.zeros(3)),
     )
