@@ -16,6 +16,7 @@ __all__ = ["DRIVERS", "driver_class", "load_driver", "split_driver_spec"]
 DRIVERS: Mapping[str, tuple[str, str]] = {
     "fake": ("lobstr_hw.drivers.fake", "FakeDriver"),
     "flock": ("lobstr_hw.drivers.flock", "FlockDriver"),
+    "lighthouse": ("lobstr_hw.drivers.lighthouse.driver", "LighthouseDriver"),
     "openvr": ("lobstr_hw.drivers.openvr", "OpenVRDriver"),
     "openxr": ("lobstr_hw.drivers.openxr", "OpenXRDriver"),
     "polhemus": ("lobstr_hw.drivers.polhemus", "PolhemusDriver"),

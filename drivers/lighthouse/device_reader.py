@@ -6,6 +6,7 @@ from lobstr_hw.drivers.lighthouse.radio import Inputs, RadioMessage, parse_messa
 from lobstr_hw.drivers.lighthouse.raw_events import EventLists, RawEvents
 from lobstr_hw.drivers.lighthouse.reports import (
     BeamReport,
+    CableReport,
     GoneReport,
     ImuReport,
     ImuSlot,
@@ -33,7 +34,9 @@ class DeviceReader:
     Attributes:
         battery: 0 to 1, or None: not told yet.
         charging: as last told.
-        inputs: the latest buttons and the like, or None.
+        inputs: the latest buttons and the like by radio, or None.
+        buttons: bits by radio, as last told (``Inputs.buttons``), or None.
+        cable_buttons: bits by cable (``CableReport.buttons``), or None.
         sees_gen2: it lies in the light of Gen2 stations but is set up for Gen1.
         gone: the tracker behind the dongle was switched off and has said nothing since.
         unreadable: radio messages and light data that made no sense.
@@ -54,6 +57,8 @@ class DeviceReader:
         self.battery: float | None = None
         self.charging = False
         self.inputs: Inputs | None = None
+        self.buttons: int | None = None
+        self.cable_buttons: int | None = None
         self.sees_gen2 = self.gone = False
         self.unreadable = 0
         self._lists = EventLists()
@@ -80,6 +85,8 @@ class DeviceReader:
                 self.sees_gen2 = True
             case GoneReport():
                 self.gone = True
+            case CableReport() as said:
+                self._add_cable(said)
 
     def use_old_radio(self) -> None:
         """It turned out to be a device of the old radio protocol."""
@@ -121,6 +128,12 @@ class DeviceReader:
             else:
                 self._lists.add_sweep((word.channel, word.port, ticks, word.half_tick))
 
+    def _add_cable(self, said: CableReport) -> None:
+        if said.buttons is not None:
+            self.cable_buttons = said.buttons
+        if said.battery is not None:
+            self.battery, self.charging = said.battery, said.charging
+
     def _add_message(self, message: RadioMessage | None) -> None:
         if message is None:
             self.unreadable += 1
@@ -129,7 +142,10 @@ class DeviceReader:
             self._lists.imu.append((self._ticks.imu(message.ticks), *message.imu))
         if message.battery is not None:
             self.battery, self.charging = message.battery, message.charging
-        self.inputs = message.inputs or self.inputs
+        if message.inputs is not None:
+            self.inputs = message.inputs
+            if message.inputs.buttons is not None:
+                self.buttons = message.inputs.buttons
         if self._in_flight:
             self._in_flight -= 1
         elif len(message.light) >= SHORTEST_LIGHT:

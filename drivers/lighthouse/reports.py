@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 __all__ = [
     "BeamReport",
+    "CableReport",
     "GoneReport",
     "ImuReport",
     "ImuSlot",
@@ -63,7 +64,22 @@ class GoneReport:
     """The tracker behind a dongle was switched off."""
 
 
-Report = ImuReport | PulseReport | SweepReport | BeamReport | RadioReport | GoneReport
+@dataclass(frozen=True, slots=True)
+class CableReport:
+    """What a device says by cable besides.
+
+    Attributes:
+        buttons: bits, or None: nothing about them. Trigger 0, grip 2, menu 12, system 13.
+        battery: 0 to 1, or None: nothing about it.
+        charging: the device says so.
+    """
+
+    buttons: int | None = None
+    battery: float | None = None
+    charging: bool = False
+
+
+Report = ImuReport | PulseReport | SweepReport | BeamReport | RadioReport | GoneReport | CableReport
 
 # 20: IMU, 52 bytes        25: light, 64           21: light, 58           28: light, 64
 # 0  u8 id                 0  u8 id                0  u8 id                0  u8 id
@@ -75,8 +91,15 @@ Report = ImuReport | PulseReport | SweepReport | BeamReport | RadioReport | Gone
 #
 # 23: radio, 30 bytes      24: radio, 59           27: raw beams           26: switched off
 # 1  message               1, 30 messages (29 bytes each)
+#
+# 01: by cable, 64 bytes; byte 2 says what follows
+# 1: input                 4: battery; seen on a tracker and a Knuckles at the charger
+# 8  u32 buttons           13 u16 millivolts
+#                          15 u8  bit 7 charging, bits 0-6 percent
 IMU, PULSES, OLD_PULSES, WORDS, BEAMS = 0x20, 0x25, 0x21, 0x28, 0x27
 RADIO_ONE, RADIO_TWO, GONE = 0x23, 0x24, 0x26
+INPUT, POWER = 1, 4
+CABLE_BYTES = 16
 SLOT = struct.Struct("<6hIB")
 PULSE, OLD_PULSE = struct.Struct("<BHI"), struct.Struct("<HHI")
 LAST_PORT = 0xFD
@@ -109,6 +132,8 @@ def _parse(data: bytes) -> Report | None:
             return _radio(data, 2)
         case 0x26:
             return GoneReport()
+        case 0x01:
+            return _cable(data)
     return None
 
 
@@ -134,3 +159,13 @@ def _radio(data: bytes, count: int) -> RadioReport | None:
     return RadioReport(
         tuple(data[1 + MESSAGE_BYTES * k : 1 + MESSAGE_BYTES * (k + 1)] for k in range(count))
     )
+
+
+def _cable(data: bytes) -> CableReport | None:
+    if len(data) < CABLE_BYTES:
+        return None
+    if data[2] == INPUT:
+        return CableReport(buttons=int.from_bytes(data[8:12], "little"))
+    if data[2] == POWER:
+        return CableReport(battery=min(data[15] & 0x7F, 100) / 100, charging=data[15] >= 0x80)
+    return None

@@ -69,7 +69,7 @@ class TrackedDevice:
         self.reader = reader or DeviceReader(old_radio=False, gen2_light=False)
         self.heard: dict[int, StationCalibration] = {}
         self.decoded: Callable[[Decoded], None] | None = None
-        self._stations = dict(stations)
+        self._stations = stations
         self._settings = settings or TrackerSettings()
         self._decoder = DeviceDecoder(model, ranges)
         self._state = begin()
@@ -88,7 +88,7 @@ class TrackedDevice:
             stations: by number.
             same_world: what was tracked so far is still true.
         """
-        self._stations = dict(stations)
+        self._stations = stations
         if not same_world:
             self._state = begin()
 
