@@ -201,11 +201,13 @@ def _filter_window(
         window = take_angles(state.angles, slice(int(i), int(j)))
         now, report = correct_with_light(now, track, window, model, stations, settings.filter)
         fits = 2 * report.used >= report.hits
+        if state.on_trial:  # it is so unsure at first that nearly every hit would do
+            fits = fits and report.rms_rad < settings.seed_outlier_rad
         state = replace(
             state,
             disagreed=0 if fits else state.disagreed + 1,
             seen=FADES * state.seen + report.hits,
-            believed=FADES * state.believed + report.used,
+            believed=FADES * state.believed + (report.used if fits else 0),
         )
         if report.used >= 2 and fits:
             state = replace(state, light=int(window.ticks[-1]), rms_rad=report.rms_rad)
