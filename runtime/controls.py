@@ -13,6 +13,7 @@ from lobstr_hw.runtime.announcer import Sound, Spoken
 from lobstr_hw.runtime.calibrating import TPoseWatcher
 from lobstr_hw.runtime.feed import Feed
 from lobstr_hw.runtime.gestures import Command, Gestures
+from lobstr_hw.runtime.notices import notices
 from lobstr_hw.runtime.session import Session
 from lobstr_hw.runtime.start_watch import StartWatch
 from lobstr_hw.runtime.ticks import Tick
@@ -59,7 +60,10 @@ class Controls:
         if self._session.calibrated and not self._was_calibrated:
             self._was_calibrated = True
             self._say(Spoken("Calibrated.", Sound.DONE))
-        for command in self._gestures.add(tick.time_s, self._driver.events()):
+        events = self._driver.events()
+        for words in notices(events):
+            self._say(Spoken(words))
+        for command in self._gestures.add(tick.time_s, events):
             self._say(self._obey(command, tick.time_s))
         self._watch(tick.time_s, samples)
         self._warn(tick.time_s, samples)

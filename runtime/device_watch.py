@@ -9,6 +9,8 @@ from lobstr_hw.drivers import driver_class, load_driver, split_driver_spec
 from lobstr_hw.drivers.driver import DeviceInfo, Probe, TrackerDriver
 from lobstr_hw.errors import DriverUnavailable, LobstrError
 from lobstr_hw.runtime.clock import Clock
+from lobstr_hw.runtime.notices import notices
+from lobstr_hw.runtime.station_place import with_station_file
 from lobstr_hw.trackers import TrackerRole, TrackingState
 
 __all__ = ["UNASKED", "DeviceReport", "DeviceWatch", "DriverReport", "merged"]
@@ -123,7 +125,7 @@ class DeviceWatch:
         if not probe.available or not self._opens:
             self.report = _of_probe(self.name, found, probe)
             return
-        with load_driver(self._spec) as driver:
+        with load_driver(with_station_file(self._spec)) as driver:
             self._listen(driver)
 
     def _listen(self, driver: TrackerDriver) -> None:
@@ -132,6 +134,8 @@ class DeviceWatch:
         while not self._end.is_set():
             for sample in driver.poll(self._clock.now_s()):
                 self._states[sample.serial] = sample.state
+            for words in notices(driver.events()):
+                self._tell_once(words, f"{self.name}: {words}")
             self.report = DriverReport(self.name, True, devices=self._devices(driver.devices()))
             if self._clock.now_s() - since_s >= LISTEN_S:
                 self.settled.set()
@@ -150,9 +154,12 @@ class DeviceWatch:
     def _broke(self, error: Exception) -> None:
         text = f"{type(error).__name__}: {error}"
         self.report = DriverReport(self.name, False, f"it failed ({text})", REPORT_IT)
-        if text not in self._told:
-            self._told.add(text)
-            self._tell(f"the driver {self.name} failed ({text}); going on without it.")
+        self._tell_once(text, f"the driver {self.name} failed ({text}); going on without it.")
+
+    def _tell_once(self, what: str, words: str) -> None:
+        if what not in self._told:
+            self._told.add(what)
+            self._tell(words)
 
 
 def _of_probe(name: str, found: type[TrackerDriver], probe: Probe) -> DriverReport:

@@ -7,6 +7,7 @@ from lobstr_hw.drivers.driver import DeviceEvent, EventKind, TrackerDriver
 from lobstr_hw.drivers.tracker_log import TrackerLogWriter
 from lobstr_hw.runtime.clock import Clock
 from lobstr_hw.runtime.many_drivers import ManyDrivers
+from lobstr_hw.runtime.notices import notices
 from lobstr_hw.runtime.one_space import SPACES
 from lobstr_hw.runtime.roles import RoleTable
 from lobstr_hw.trackers import TrackerRole, TrackerSample
@@ -70,6 +71,7 @@ class Recorder:
         table: RoleTable,
         clock: Clock,
         rate_hz: float,
+        tell: Callable[[str], None] | None = None,
     ) -> None:
         """Get ready.
 
@@ -80,6 +82,7 @@ class Recorder:
             clock: of the samples' times.
             rate_hz: how often the driver is asked; a driver without times of its own gives that
                 many samples.
+            tell: is given the drivers' words for the user.
         """
         self.trackers: dict[str, TrackerTally] = {}
         self.elapsed_s = 0.0
@@ -87,6 +90,7 @@ class Recorder:
         self._driver, self._writer, self._table = driver, writer, table
         self._clock, self._rate_hz = clock, rate_hz
         self._asked_s = -float("inf")
+        self._tell = tell or (lambda words: None)
 
     def run(self, stop: Callable[[], bool], duration_s: float | None = None) -> None:
         """Go on until ``stop``, or for so long.
@@ -117,7 +121,10 @@ class Recorder:
             self._ask_devices(now_s)
         if new and isinstance(self._driver, ManyDrivers):
             self._writer.metadata(SPACES, self._spaces(self._driver))
-        self._note(self._driver.events())
+        events = self._driver.events()
+        for words in notices(events):
+            self._tell(words)
+        self._note(events)
         for serial, first in new.items():  # a tracker's state stands before its first pose
             self._write_state(serial, first.time_s, first)
         for sample in samples:

@@ -9,6 +9,7 @@ from lobstr_hw.drivers.driver import Probe, TrackerDriver
 from lobstr_hw.errors import DriverError, TrackerNotFound
 from lobstr_hw.runtime.many_drivers import ManyDrivers
 from lobstr_hw.runtime.part_driver import PartDriver
+from lobstr_hw.runtime.station_place import with_station_file
 from lobstr_hw.trackers import TrackerRole
 
 __all__ = [
@@ -39,7 +40,7 @@ def driver_from_spec(spec: str) -> TrackerDriver:
         ValueError: no such driver or role, or an option it does not know.
     """
     _, options = split_driver_spec(spec)
-    driver = load_driver(spec)
+    driver = load_driver(with_station_file(spec))
     if not {"role", "name"} & options.keys():
         return driver
     return PartDriver(driver, space_name(spec), _role(options.get("role"), spec))
@@ -109,7 +110,7 @@ def what_is_there(tell: Callable[[str], None]) -> TrackerDriver:
             continue
         looked[name] = _probe(name)
         if looked[name].available:
-            driver = load_driver(name)
+            driver = load_driver(with_station_file(name))
             try:
                 with driver:  # whether SteamVR runs, only a session with it can tell
                     pass

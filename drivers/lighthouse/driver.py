@@ -11,12 +11,13 @@ from typing import ClassVar
 from lobstr_hw.drivers.chosen_roles import ROLE_OPTIONS, by_serial, hint
 from lobstr_hw.drivers.driver import BASE_STATION, DeviceInfo, Probe
 from lobstr_hw.drivers.lighthouse.hub import DeviceAbout, Hub
+from lobstr_hw.drivers.lighthouse.steamvr import steamvr_runs
 from lobstr_hw.drivers.lighthouse.survey import station_name
 from lobstr_hw.drivers.lighthouse.transport import Transport
 from lobstr_hw.drivers.lighthouse.transports import available_transports, choose_transport
 from lobstr_hw.drivers.stream import StreamDriver
 from lobstr_hw.drivers.vendor import probe_library
-from lobstr_hw.errors import DriverUnavailable, StationFileError
+from lobstr_hw.errors import DeviceBusy, DriverUnavailable, StationFileError
 from lobstr_hw.trackers import TrackerRole
 
 __all__ = ["LighthouseDriver"]
@@ -67,6 +68,8 @@ class LighthouseDriver(StreamDriver):
     def _connect(self) -> Hub:
         transport = self._chosen_transport
         if transport is None or isinstance(transport, str):
+            if steamvr_runs():
+                raise DeviceBusy("SteamVR has these devices: close it, or take --driver openvr")
             transport = choose_transport(transport)
         try:
             self._hub = Hub(transport, self._path)

@@ -34,13 +34,15 @@ def _table(*titles: str) -> Table:
 
 
 def _devices(reports: Sequence[DriverReport]) -> Table:
-    table = _table("driver", "serial", "kind", "model", "role", "state", "battery", "firmware")
+    titles = ["driver", "serial", "kind", "model", "role", "state", "battery", "firmware"]
+    sees = any(d.stations_in_view is not None for report in reports for d in report.devices)
+    table = _table(*titles, *(["sees"] if sees else []))
     for report in reports:
         for device in report.devices:
             role = (device.role_hint or "-").replace("_", " ")
             cells = (device.serial, device.kind, device.model or "-", role)
             last = (_state(device), _battery(device.battery), Text(device.firmware or "-"))
-            table.add_row(report.name, *map(Text, cells), *last)
+            table.add_row(report.name, *map(Text, cells), *last, *([_sees(device)] if sees else []))
     return table
 
 
@@ -64,6 +66,16 @@ def _state(device: DeviceReport) -> Text:
         return Text("-" + worn)
     good = device.state in (TrackingState.OK, TrackingState.INERTIAL)
     return Text(device.state.replace("_", " ") + worn, "green" if good else "yellow")
+
+
+def _sees(device: DeviceReport) -> Text:
+    """Base stations in view, and on how many sensors."""
+    if device.stations_in_view is None:
+        return Text("-")
+    if not device.stations_in_view:
+        return Text("no station", "yellow")
+    many = "" if device.stations_in_view == 1 else "s"
+    return Text(f"{device.stations_in_view} station{many}, {device.sensors_hit} sensors")
 
 
 def _battery(battery: float | None) -> Text:

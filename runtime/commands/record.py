@@ -112,7 +112,7 @@ def _record(
     clock = HostClock()
     writer = TrackerLogWriter(args.out)
     table = RoleTable(None if profile is None else profile.roles, driver.devices)
-    recorder = Recorder(driver, writer, table, clock, args.rate)
+    recorder = Recorder(driver, writer, table, clock, args.rate, _tell)
     trouble = ""
     try:
         if profile is not None:

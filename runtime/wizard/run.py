@@ -8,6 +8,7 @@ from lobstr_hw.drivers.replay import ReplayDriver
 from lobstr_hw.errors import CalibrationError
 from lobstr_hw.runtime.announcer import Spoken
 from lobstr_hw.runtime.clock import Clock
+from lobstr_hw.runtime.notices import notices
 from lobstr_hw.runtime.wizard.flow import Wizard
 from lobstr_hw.runtime.wizard.view import View
 
@@ -79,7 +80,9 @@ def run_with_person(
         now_s = clock.now_s()
         if timeout_s is not None and now_s - began_s > timeout_s:
             raise CalibrationError(f"not done within {timeout_s:g} s: {wizard.failure()}")
-        said = wizard.add(now_s, driver.poll(now_s), driver.events(), driver.devices())
+        samples, events = driver.poll(now_s), driver.events()
+        said = [Spoken(words) for words in notices(events)]
+        said += wizard.add(now_s, samples, events, driver.devices())
         for key in front.keys():
             said += wizard.press(key)
         front.say(said)

@@ -1,0 +1,27 @@
+"""Where the file of the base stations lies when nobody says otherwise."""
+
+from pathlib import Path
+
+import platformdirs
+
+from lobstr_hw.drivers import driver_class, split_driver_spec
+
+__all__ = ["default_stations_path", "with_station_file"]
+
+
+def default_stations_path() -> Path:
+    """In the user's configuration folder; it need not exist yet."""
+    return platformdirs.user_config_path("lobstr-hw", appauthor=False) / "base_stations.json"
+
+
+def with_station_file(spec: str) -> str:
+    """A driver's spec, NAME[:key=value,...]; a driver that keeps base stations is told where.
+
+    Raises:
+        ValueError: there is no such driver.
+    """
+    name, options = split_driver_spec(spec)
+    keeps_stations = "stations" in getattr(driver_class(name), "options", {})
+    if not keeps_stations or "stations" in options:
+        return spec
+    return f"{spec}{',' if options else ':'}stations={default_stations_path()}"
