@@ -1,117 +1,79 @@
-"""``lobstr-log import``: a tracker log from a recording in another form."""
+"""``lobstr-log import``: a tracker log from recordings in another form."""
 
 import argparse
-import csv
-import gzip
-import math
-from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import IO
 
-import numpy as np
-
-from lobstr_hw.drivers.tracker_log import TrackerLogWriter
+from lobstr_hw.drivers.vendor import require_library
 from lobstr_hw.errors import FileFormatError
-from lobstr_hw.poses import PartialPose
-from lobstr_hw.rotations import from_quat_xyzw
 from lobstr_hw.runtime.commands.log_export import CSV_COLUMNS
-from lobstr_hw.runtime.commands.log_report import Report, Step, Subparsers, progress_bar, whole_file
-from lobstr_hw.trackers import TrackerRole, TrackerSample, TrackingState
+from lobstr_hw.runtime.commands.log_import_csv import import_csv
+from lobstr_hw.runtime.commands.log_report import Report, Step, Subparsers, progress_bar
+from lobstr_hw.runtime.commands.recording_kind import RecordingKind, recording_kind
 
-__all__ = ["add_parser", "csv_samples", "run"]
+__all__ = ["add_parser", "run"]
 
-GZIP_MAGIC = b"\x1f\x8b"
-BATCH = 500
+EXAMPLES = """examples:
+  lobstr-log import take.csv.gz take.mcap
+  lobstr-log import room.pcap.gz --output room.mcap --save-stations room.json
+  lobstr-log import still.pcapng --output still.mcap --stations room.json --config wand.json
+"""
 
 
 def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """The options of ``import``."""
     parser = subparsers.add_parser(
         "import",
-        help="a log from the CSV that export writes",
-        description="Make a log from a CSV as export --csv writes it (.gz as it is). The kind of "
-        "the file is told from its content.",
-        epilog="example: lobstr-log import take.csv.gz take.mcap",
+        help="a log from Lighthouse recordings, or from the CSV that export writes",
+        description="Make a log from what was recorded elsewhere; .gz as it is. The kind of a file "
+        "is told from its content: USB traffic of Lighthouse devices (usbmon, USBPcap, and what "
+        "lobstr-record --raw writes), a text recording of libsurvive, or a CSV as export --csv "
+        "writes it. Where the base stations stand is worked out from the light in the recordings.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="the recording")
-    parser.add_argument("out", type=Path, metavar="OUT.mcap", help="the log to write")
+    add = parser.add_argument
+    add("files", type=Path, metavar="FILE", nargs="+", help="the recordings, of one room")
+    add("--output", type=Path, metavar="LOG.mcap", help="the log to write (else the last FILE)")
+    add("--stations", type=Path, metavar="FILE", help="where the base stations stand")
+    add("--save-stations", type=Path, metavar="FILE", help="keep where they stand")
+    add(
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="configuration of a device that was already in use when the recording began: its "
+        "JSON, or a recording that has it",
+    )
     return parser
 
 
 def run(options: argparse.Namespace) -> Report:
     """Write the log."""
-    with progress_bar("reading the rows") as step, _opened(options.file) as lines:
-        with whole_file(options.out) as part:
-            rows = _write(part, csv_samples(lines, str(options.file)), step)
-    document = {"file": str(options.out), "kind": "csv", "rows": rows}
-    return Report(f"{options.out}: {rows} samples", document)
+    *files, out = [*options.files, options.output] if options.output else options.files
+    if not files:
+        raise FileFormatError(f"which log should {out} become? Name it with --output LOG.mcap.")
+    kinds = {path: recording_kind(path) for path in files}
+    for path, kind in kinds.items():
+        if kind is RecordingKind.UNKNOWN or (kind is RecordingKind.CSV and len(files) > 1):
+            raise FileFormatError(_what_is_known(path, kind))
+    with progress_bar("reading") as step:
+        if kinds[files[0]] is RecordingKind.CSV:
+            return import_csv(files[0], out, step)
+        return _lighthouse(files, out, options, step)
 
 
-def _opened(path: Path) -> IO[str]:
-    with path.open("rb") as file:
-        magic = file.read(len(GZIP_MAGIC))
-    opener = gzip.open if magic == GZIP_MAGIC else open
-    return opener(path, "rt", encoding="utf-8", errors="replace", newline="")
+def _lighthouse(files: list[Path], out: Path, options: argparse.Namespace, step: Step) -> Report:
+    require_library("scipy", "scipy", "lighthouse")
+    from lobstr_hw.runtime.commands.log_import_lighthouse import import_recordings
+
+    known = (options.config, options.stations, options.save_stations)
+    return import_recordings(files, out, *known, step)
 
 
-def _write(path: Path, rows: Iterable[tuple[TrackerRole | None, TrackerSample]], step: Step) -> int:
-    roles: dict[str, TrackerRole | None] = {}
-    batch: list[TrackerSample] = []
-    count = 0
-    with TrackerLogWriter(path) as writer:
-        for role, sample in rows:
-            if sample.serial not in roles or roles[sample.serial] != role:
-                writer.add_samples(batch)
-                batch = []
-                roles[sample.serial] = role
-                writer.add_state(sample.serial, role, sample.state, sample.tracked, sample.time_s)
-            batch.append(sample)
-            count += 1
-            if len(batch) >= BATCH:
-                writer.add_samples(batch)
-                batch = []
-                step(count)
-        writer.add_samples(batch)
-    return count
-
-
-def csv_samples(
-    lines: Iterable[str], name: str
-) -> Iterator[tuple[TrackerRole | None, TrackerSample]]:
-    """Role and sample of each row.
-
-    Raises:
-        FileFormatError: the first line is not export's, or a row cannot be read.
-    """
-    rows = csv.reader(lines)
-    head = next(rows, [])
-    if tuple(head) != CSV_COLUMNS:
-        raise FileFormatError(
-            f"{name} is not a recording that can be imported: it begins with "
-            f"{','.join(head)[:60]!r}. Known is the CSV of lobstr-log export, which begins with "
-            + ",".join(CSV_COLUMNS)
-        )
-    for row in rows:
-        try:
-            yield _sample(row)
-        except (ValueError, IndexError) as error:
-            raise FileFormatError(
-                f"{name}, line {rows.line_num}: {error}. Mend or delete this line."
-            ) from error
-
-
-def _sample(row: list[str]) -> tuple[TrackerRole | None, TrackerSample]:
-    if len(row) != len(CSV_COLUMNS):
-        raise ValueError(f"{len(row)} columns instead of {len(CSV_COLUMNS)}")
-    if row[10] not in ("0", "1"):
-        raise ValueError(f"tracked is {row[10]!r} instead of 0 or 1")
-    time_s, tracked = float(row[0]), row[10] == "1"
-    if not 0.0 <= time_s < math.inf:
-        raise ValueError(f"time {row[0]!r} is not a number from 0 up")
-    p = None if row[3] == "" else np.array([float(v) for v in row[3:6]])
-    q = np.array([float(v) for v in row[6:10]])
-    if not np.any(q):
-        raise ValueError("a quaternion of zeros is no rotation")
-    role = TrackerRole(row[2]) if row[2] else None
-    state = TrackingState.OK if tracked else TrackingState.OCCLUDED
-    return role, TrackerSample(row[1], PartialPose(from_quat_xyzw(q), p), time_s, tracked, state)
+def _what_is_known(path: Path, kind: RecordingKind) -> str:
+    if kind is RecordingKind.CSV:
+        return f"{path} is a CSV, of which one makes a log: import it alone."
+    return (
+        f"{path} is not a recording that can be imported. Known is the CSV of lobstr-log export, "
+        f"which begins with {','.join(CSV_COLUMNS)}; and of Lighthouse devices a usbmon or USBPcap "
+        "capture and libsurvive's text recording, any of them packed with gzip or not."
+    )
