@@ -6,15 +6,15 @@ training, and the weights that were best there are the ones that are exported.
 """
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from lobstr_hw.features import clip_features, clip_points, reference_frames
 from lobstr_hw.rotations import heading_angle
+from lobstr_hw.training.averaging import add_to_average, with_average
 from lobstr_hw.training.carried_losses import (
     ChunkTargets,
     carried_losses,
@@ -24,8 +24,12 @@ from lobstr_hw.training.carried_losses import (
 from lobstr_hw.training.checkpoint import Carried, Run
 from lobstr_hw.training.config import TrainingConfig
 from lobstr_hw.training.dataset import RATE_HZ, Clips
+from lobstr_hw.training.devices import device_of, precision_of
 from lobstr_hw.training.episodes import EpisodeSource
 from lobstr_hw.training.kinematics import rotations_from_6d, toes_in_reference
+from lobstr_hw.training.mirrored import shipped
+from lobstr_hw.training.network import LobstrNetwork
+from lobstr_hw.training.recurrence import run_gru
 from lobstr_hw.training.streams import Chunk, Position, Streams
 
 __all__ = ["WholeClip", "held_out_clips", "keep_best", "train_carried", "validate_carried"]
@@ -46,9 +50,12 @@ def train_carried(
     while run.step < config.steps:
         run.curve.append(_train_step(run, streams, config))
         run.step += 1
+        add_to_average(run, config)
         due = run.step % config.validate_every == 0 or run.step == config.steps
         if held_out and due:
-            keep_best(run, [float(run.step), *validate_carried(run, held_out)])
+            with with_average(run):
+                figures = validate_carried(shipped(run.network, config), held_out)
+                keep_best(run, [float(run.step), *figures])
         yield run
 
 
@@ -70,8 +77,7 @@ def _train_step(run: Run, streams: Streams, config: TrainingConfig) -> list[floa
     run.network.train()
     hidden = run.carried.hidden * torch.from_numpy(~chunk.first)[None, :, None]
     x = torch.from_numpy((chunk.x - run.stats.input_mean) / run.stats.input_scale)
-    with _precision(config):
-        pose, logits, hidden = run.network(x, hidden, last_only=False)
+    pose, logits, hidden = _through(run.network, x, hidden, config)
     terms = carried_losses(pose, logits, _targets(chunk, config), config.weights)
     run.optimizer.zero_grad(set_to_none=True)
     terms.total.backward()  # type: ignore[no-untyped-call]
@@ -80,6 +86,19 @@ def _train_step(run: Run, streams: Streams, config: TrainingConfig) -> list[floa
     run.carried = Carried(hidden.detach().float(), streams.position)
     values = (terms.total, terms.pose, terms.toe, terms.velocity, terms.contact)
     return [run.step + 1.0, *(float(v.detach()) for v in values), learning_rate]
+
+
+def _through(
+    network: LobstrNetwork, x: Tensor, hidden: Tensor, config: TrainingConfig
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Pose, logits and the last state of a chunk, in the precision of the settings."""
+    gru = network.encoder
+    if config.precision == "bf16" and isinstance(gru, nn.GRU) and device_of(config).type == "cpu":
+        encoded, hidden = run_gru(gru, x, hidden)
+        return *network.heads(encoded), hidden
+    with precision_of(config):
+        pose, logits, hidden = network(x, hidden, last_only=False)
+    return pose, logits, hidden
 
 
 def _targets(chunk: Chunk, config: TrainingConfig) -> ChunkTargets:
@@ -115,22 +134,22 @@ def held_out_clips(clips: Clips, run: Run, config: TrainingConfig) -> list[Whole
     return [clip for clip in out if len(clip.x) > NOT_SCORED + 1]
 
 
-def validate_carried(run: Run, clips: list[WholeClip]) -> list[float]:
+def validate_carried(network: nn.Module, clips: list[WholeClip]) -> list[float]:
     """Toe error (cm), rotation error (degrees), contact accuracy, balanced, velocity error (cm/s).
 
     The state is carried from each clip's start. Folders count alike: the mean of their means.
     """
-    run.network.eval()
+    network.eval()
     tables: dict[str, list[Tensor]] = {}
     with torch.no_grad():
         for clip in clips:
-            tables.setdefault(clip.folder, []).append(_sums(run, clip))
+            tables.setdefault(clip.folder, []).append(_sums(network, clip))
     return torch.stack([_scores(torch.stack(t).sum(0)) for t in tables.values()]).mean(0).tolist()
 
 
-def _sums(run: Run, clip: WholeClip) -> Tensor:
+def _sums(network: nn.Module, clip: WholeClip) -> Tensor:
     """Frames; toe and rotation error; labels on, right on, off, right off; steps; velocity."""
-    pose, logits, _ = run.network(clip.x[None], last_only=False)
+    pose, logits, _ = network(clip.x[None], last_only=False)
     pose, logits = pose[0, NOT_SCORED:], logits[0, NOT_SCORED:]
     truth, contact, yaw = (a[NOT_SCORED:] for a in (clip.pose, clip.contact, clip.yaw))
     errors = toes_in_reference(pose) - toes_in_reference(truth)
@@ -158,7 +177,3 @@ def _scores(sums: Tensor) -> Tensor:
     balanced = 0.5 * (right_on / on.clamp(min=1.0) + right_off / off.clamp(min=1.0))
     toe_cm, speed_cm_s = 100.0 * toe / frames, 100.0 * RATE_HZ * velocity / steps
     return torch.stack([toe_cm, torch.rad2deg(angle / frames), accuracy, balanced, speed_cm_s])
-
-
-def _precision(config: TrainingConfig) -> AbstractContextManager[object]:
-    return torch.autocast("cpu", dtype=torch.bfloat16, enabled=config.precision == "bf16")

@@ -51,6 +51,7 @@ class Run:
         validation: one row per validation.
         carried: state of the streams, in the recipe ``carried``.
         best: weights that were best in validation, where the recipe keeps them.
+        average: running mean of the weights, where the configuration wants one.
     """
 
     network: LobstrNetwork
@@ -62,6 +63,7 @@ class Run:
     validation: list[list[float]] = field(default_factory=list)
     carried: Carried | None = None
     best: dict[str, torch.Tensor] | None = None
+    average: dict[str, torch.Tensor] | None = None
 
 
 def new_run(config: TrainingConfig, stats: Statistics) -> Run:
@@ -93,6 +95,8 @@ def save_checkpoint(path: Path, run: Run) -> None:
         document["carried"] = _carried_tensors(run.carried)
     if run.best is not None:
         document["best"] = run.best
+    if run.average is not None:
+        document["average"] = run.average
     partial = path.with_suffix(".partial")
     with partial.open("wb") as file:
         torch.save(document, file)
@@ -118,7 +122,7 @@ def load_checkpoint(path: Path, config: TrainingConfig) -> Run:
         run.optimizer.load_state_dict(document["optimizer"])
         run.step, run.wall_s = int(document["step"]), float(document["wall_s"])
         run.curve, run.validation = document["curve"].tolist(), document["validation"].tolist()
-        run.best = document.get("best")
+        run.best, run.average = document.get("best"), document.get("average")
         run.carried = _carried_of(document.get("carried"))
     except FileNotFoundError as error:
         raise ModelError(f"{path}: no checkpoint. Start without --resume.") from error

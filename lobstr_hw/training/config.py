@@ -119,6 +119,11 @@ class TrainingConfig:
         feature_form: ``v1``; the others are for the tables.
         contact_label: ``floor`` (height over a local floor, and speed), or ``paper`` (1 cm).
         mirror: half of the windows with left and right exchanged.
+        everybody: trained on the people of the validation part too, so nothing is validated; for
+            weights that ship, with settings and steps that were chosen without it.
+        average: of the weights over the steps: what the mean of before keeps in a step; 0 is none.
+            In the recipe ``carried`` the mean is what is validated and exported.
+        mirror_mean: the exported network answers for its mirror image too and says the mean.
         validation_windows: drawn once from the validation clips.
         validate_every, checkpoint_every: steps.
     """
@@ -138,6 +143,9 @@ class TrainingConfig:
     feature_form: Form = "v1"
     contact_label: Literal["floor", "paper"] = "floor"
     mirror: bool = True
+    everybody: bool = False
+    average: float = 0.0
+    mirror_mean: bool = False
     augmentation: Augmentation = field(default_factory=Augmentation)
     weights: LossWeights = field(default_factory=LossWeights)
     carried: CarriedSettings = field(default_factory=CarriedSettings)

@@ -7,7 +7,7 @@ engine loads them (constant folding), which halves the file; what that costs is 
 import copy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,12 +19,14 @@ from lobstr_hw.errors import ModelError
 from lobstr_hw.lower_body import POSE_SIZE
 from lobstr_hw.predictors.weights import NetworkCard, load_network, write_card
 from lobstr_hw.training.config import STEPPED_KINDS
+from lobstr_hw.training.mirrored import MirrorMean, mirror_matrices, mirror_nodes
 from lobstr_hw.training.network import CONTACT_SIZE, LobstrNetwork
 from lobstr_hw.training.step_graphs import step_nodes
 
 __all__ = ["ExportError", "export_network", "measure_export", "stored"]
 
 Float32 = npt.NDArray[np.float32]
+Stepped = TypeVar("Stepped", LobstrNetwork, MirrorMean)
 
 OPSET = 17
 IR_VERSION = 8
@@ -40,7 +42,9 @@ class ExportError:
     hidden: float
 
 
-def export_network(network: LobstrNetwork, card: NetworkCard, path: Path) -> ExportError:
+def export_network(
+    network: LobstrNetwork | MirrorMean, card: NetworkCard, path: Path
+) -> ExportError:
     """Write ``path`` (.onnx) and its card beside it, and compare them with the network.
 
     Returns:
@@ -60,7 +64,9 @@ def export_network(network: LobstrNetwork, card: NetworkCard, path: Path) -> Exp
     return measure_export(network, path)
 
 
-def measure_export(network: LobstrNetwork, path: Path, steps: int = 200) -> ExportError:
+def measure_export(
+    network: LobstrNetwork | MirrorMean, path: Path, steps: int = 200
+) -> ExportError:
     """Run the file and the network side by side, both carrying their own state."""
     exported = load_network(path)
     rng = np.random.default_rng(0)
@@ -78,7 +84,7 @@ def measure_export(network: LobstrNetwork, path: Path, steps: int = 200) -> Expo
     return ExportError(*(float(w) for w in worst))
 
 
-def stored(network: LobstrNetwork) -> LobstrNetwork:
+def stored(network: Stepped) -> Stepped:
     """The network whose matrices are what the file holds: it and the engine say the same."""
     rounded = copy.deepcopy(network)
     with torch.no_grad():
@@ -88,16 +94,22 @@ def stored(network: LobstrNetwork) -> LobstrNetwork:
     return rounded
 
 
-def _model(network: LobstrNetwork) -> onnx.ModelProto:
-    weights = _weights(network)
+def _model(network: LobstrNetwork | MirrorMean) -> onnx.ModelProto:
+    nodes = step_nodes(network.kind)
+    if isinstance(network, MirrorMean):
+        weights = _weights(network.network)
+        weights |= {k: t.numpy() for k, t in mirror_matrices(len(weights["W_x"])).items()}
+        nodes = mirror_nodes(nodes)
+    else:
+        weights = _weights(network)
     matrices = [k for k, w in weights.items() if w.ndim > 1]
     arrays = {k: w for k, w in weights.items() if w.ndim == 1}
     arrays |= {k + "_16": weights[k].astype(np.float16) for k in matrices}
-    arrays["one"] = np.array(1.0, dtype=np.float32)
+    arrays |= {"one": np.array(1.0, dtype=np.float32), "half": np.array(0.5, dtype=np.float32)}
     casts = [helper.make_node("Cast", [k + "_16"], [k], to=TensorProto.FLOAT) for k in matrices]
     state = network.state_size
     graph = helper.make_graph(
-        [*casts, *step_nodes(network.kind)],
+        [*casts, *nodes],
         "lobstr_step",
         [_value("x", len(weights["W_x"])), _value("h", state)],
         [_value("h_next", state), _value("pose", POSE_SIZE), _value("contact", CONTACT_SIZE)],

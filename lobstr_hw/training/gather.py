@@ -62,9 +62,9 @@ def _fingerprint(files: Iterable[ClipFile]) -> str:
     return digest.hexdigest()[:16]
 
 
-def part_of_clips(clips: Clips, split: Split, part: str) -> Clips:
-    """The clips of one part of the split."""
-    return clips.select(np.array([split.part_of(str(name)) == part for name in clips.names]))
+def part_of_clips(clips: Clips, split: Split, *parts: str) -> Clips:
+    """The clips of one part of the split, or of several."""
+    return clips.select(np.array([split.part_of(str(name)) in parts for name in clips.names]))
 
 
 def describe(clips: Clips, split: Split) -> dict[str, object]:

@@ -76,9 +76,13 @@ class LobstrNetwork(nn.Module):
         encoded, state = self.encoder(x.to(here), state)
         if last_only:
             encoded = encoded[:, -1]
+        pose, logits = self.heads(encoded)
+        return pose.to(home), logits.to(home), state.to(home)
+
+    def heads(self, encoded: Tensor) -> tuple[Tensor, Tensor]:
+        """Pose (..., 48) and contact logits (..., 4) of what the encoder says (..., H)."""
         latent = torch.relu(self.latent(encoded))
-        pose = self.pose(latent).float() + self.output_mean
-        return pose.to(home), self.contact(latent).float().to(home), state.to(home)
+        return self.pose(latent).float() + self.output_mean, self.contact(latent).float()
 
 
 def parameter_count(network: nn.Module) -> int:

@@ -19,6 +19,7 @@ from lobstr_hw.training.dataset import RATE_HZ
 from lobstr_hw.training.export import ExportError, export_network
 from lobstr_hw.training.export_two_way import export_two_way
 from lobstr_hw.training.loop import VALIDATION_COLUMNS
+from lobstr_hw.training.mirrored import MirrorMean, shipped
 from lobstr_hw.training.network import LobstrNetwork, parameter_count
 from lobstr_hw.training.sources import notices
 from lobstr_hw.training.two_way_network import TwoWayNetwork
@@ -53,7 +54,7 @@ def network_card(run: Run, config: TrainingConfig, details: dict[str, Any]) -> N
     return NetworkCard(
         model,
         config.feature_form,
-        run.network.state_size,
+        shipped(run.network, config).state_size,
         stats.input_mean,
         stats.input_scale,
         stats.output_mean,
@@ -78,8 +79,9 @@ def export_run(folder: Path, out: Path, metrics: Mapping[str, Path] | None = Non
     config = read_config(folder / "config.json")
     run = load_checkpoint(folder / "checkpoint.pt", config)
     data = _read_json(folder / "data.json")
-    if run.best is not None:
-        run.network.load_state_dict(run.best)
+    weights = run.average if run.best is None else run.best
+    if weights is not None:
+        run.network.load_state_dict(weights)
     details = {
         "recipe": config.recipe,
         "architecture": _architecture(config),
@@ -93,13 +95,13 @@ def export_run(folder: Path, out: Path, metrics: Mapping[str, Path] | None = Non
         "configuration": asdict(config),
         "metrics": {k: _read_json(p).get("all", {}) for k, p in (metrics or {}).items()},
     }
-    error = _write(run.network, network_card(run, config, details), out)
+    error = _write(shipped(run.network, config), network_card(run, config, details), out)
     details["float16_storage_error"] = asdict(error)
     write_card(out.with_suffix(".json"), network_card(run, config, details))
     return error
 
 
-def _write(network: LobstrNetwork, card: NetworkCard, out: Path) -> ExportError:
+def _write(network: LobstrNetwork | MirrorMean, card: NetworkCard, out: Path) -> ExportError:
     if isinstance(network, TwoWayNetwork):
         return export_two_way(network, card, out)
     return export_network(network, card, out)
@@ -109,7 +111,8 @@ def _architecture(config: TrainingConfig) -> str:
     encoder = f"{config.network.upper()} {config.hidden_size}"
     if config.recipe == "two-way":
         encoder = f"two-way {encoder} + {config.hidden_size}"
-    return f"{encoder}, Linear 128 + ReLU, heads 48 and 4"
+    mirrored = "; the mean with its mirror image's answer" if config.mirror_mean else ""
+    return f"{encoder}, Linear 128 + ReLU, heads 48 and 4{mirrored}"
 
 
 def _validation(run: Run) -> dict[str, float]:

@@ -49,7 +49,7 @@ def train_two_way(
         run.step += 1
         due = run.step % config.validate_every == 0 or run.step == config.steps
         if held_out and due:
-            keep_best(run, [float(run.step), *validate_carried(run, held_out)])
+            keep_best(run, [float(run.step), *validate_carried(run.network, held_out)])
         yield run
 
 

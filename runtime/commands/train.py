@@ -74,6 +74,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     start.add_argument("--config", type=Path, metavar="FILE", help="a config.json to start from")
     parser.add_argument("--steps", type=int, help="of one batch (1500; carried 4000; two-way 2600)")
+    parser.add_argument(
+        "--everybody",
+        action="store_true",
+        default=None,
+        help="train on the people of the validation part too, and validate nothing",
+    )
     parser.add_argument("--seed", type=int, help="of weights, windows and errors (1)")
     parser.add_argument("--precision", choices=("fp32", "bf16"), help="of the products (fp32)")
     parser.add_argument(
@@ -132,8 +138,10 @@ def _train(options: argparse.Namespace) -> int:
     with processes() as who:
         with who.one_goes_ahead():
             clips = gather(options.data, split, options.cache or out / "cache", _retargeting_bar)
-        train = part_of_clips(clips, split, "train")
-        validation = part_of_clips(clips, split, "validation") if who.first else None
+        parts = ("train", "validation") if config.everybody else ("train",)
+        train = part_of_clips(clips, split, *parts)
+        held_out = who.first and not config.everybody
+        validation = part_of_clips(clips, split, "validation") if held_out else None
         run = _start(out, config, train, options.resume, who)
         if who.first:
             _write_json(out / "data.json", describe(train, split))
@@ -144,7 +152,7 @@ def _train(options: argparse.Namespace) -> int:
 def _config(options: argparse.Namespace) -> "TrainingConfig":
     from lobstr_hw.training.config import read_config, recipe_config
 
-    keys = ("steps", "seed", "precision", "device", "network", "feature_form")
+    keys = ("steps", "seed", "precision", "device", "network", "feature_form", "everybody")
     named = {key: getattr(options, key) for key in keys}
     changes = {key: value for key, value in named.items() if value is not None}
     kept = options.out / "config.json"

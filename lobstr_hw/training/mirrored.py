@@ -1,0 +1,96 @@
+"""A network that also answers for its mirror image, and says the mean of both answers.
+
+One set of weights, two states. At batch 1 a step's time goes into reading the weights, so the
+second answer costs little; what it takes away is what one side of the body has learnt by chance.
+"""
+
+from typing import Any
+
+import numpy as np
+import torch
+from onnx import NodeProto, helper
+from torch import Tensor, nn
+
+from lobstr_hw.features import mirror_features
+from lobstr_hw.lower_body import POSE_SIZE, mirror_pose_6d
+from lobstr_hw.training.config import TrainingConfig
+from lobstr_hw.training.network import LobstrNetwork
+
+__all__ = ["MirrorMean", "mirror_matrices", "mirror_nodes", "shipped"]
+
+
+def mirror_matrices(inputs: int) -> dict[str, Tensor]:
+    """What exchanges left and right of a row: x @ M, of the z-scored input, pose and logits.
+
+    The input's mean and scale are those of motions and their mirror images, so that z-scores mirror
+    like the features themselves.
+    """
+    eye = np.eye(4).reshape(4, 2, 2)
+    arrays = {
+        "mirror_x": mirror_features(np.eye(inputs)),
+        "mirror_pose": mirror_pose_6d(np.eye(POSE_SIZE)),
+        "mirror_contact": eye[:, ::-1].reshape(4, 4),
+    }
+    return {name: torch.from_numpy(a.astype(np.float32)) for name, a in arrays.items()}
+
+
+class MirrorMean(nn.Module):
+    """Wraps a network with one state vector; the state is that of both sides, (1, n, 2 H)."""
+
+    def __init__(self, network: LobstrNetwork) -> None:
+        """Take a trained network."""
+        super().__init__()
+        self.network = network
+        self.kind = network.kind
+        self.state_size = 2 * network.state_size
+
+    def forward(
+        self, x: Tensor, hidden: Tensor | None = None, last_only: bool = True
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """As :meth:`LobstrNetwork.forward`, with a state (1, n, 2 H)."""
+        M = mirror_matrices(x.shape[-1])
+        n = len(x)
+        both = None if hidden is None else torch.cat(hidden.chunk(2, dim=-1), dim=1)
+        pose, logits, both = self.network(torch.cat([x, x @ M["mirror_x"]]), both, last_only)
+        pose = 0.5 * (pose[:n] + pose[n:] @ M["mirror_pose"])
+        logits = 0.5 * (logits[:n] + logits[n:] @ M["mirror_contact"])
+        return pose, logits, torch.cat(both.chunk(2, dim=1), dim=-1)
+
+
+def shipped(network: LobstrNetwork, config: TrainingConfig) -> LobstrNetwork | MirrorMean:
+    """What a run's weights are exported and validated as."""
+    return MirrorMean(network) if config.mirror_mean else network
+
+
+_INNER = ("x", "h", "h_next", "pose", "contact")
+
+
+def mirror_nodes(step: list[NodeProto]) -> list[NodeProto]:
+    """The step of a network around which both sides' rows are put together and parted again."""
+    for node in step:
+        for names in (node.input, node.output):
+            names[:] = [f"both_{name}" if name in _INNER else name for name in names]
+    return [
+        _node("MatMul", "x mirror_x", "x_mirrored"),
+        _node("Concat", "x x_mirrored", "both_x", axis=0),
+        _node("Split", "h", "h_here h_mirrored", axis=1),
+        _node("Concat", "h_here h_mirrored", "both_h", axis=0),
+        *step,
+        _node("Split", "both_h_next", "h_next_here h_next_mirrored", axis=0),
+        _node("Concat", "h_next_here h_next_mirrored", "h_next", axis=1),
+        *_mean("pose"),
+        *_mean("contact"),
+    ]
+
+
+def _mean(name: str) -> list[NodeProto]:
+    return [
+        _node("Split", f"both_{name}", f"{name}_here {name}_there", axis=0),
+        _node("MatMul", f"{name}_there mirror_{name}", f"{name}_back"),
+        _node("Add", f"{name}_here {name}_back", f"{name}_sum"),
+        _node("Mul", f"{name}_sum half", name),
+    ]
+
+
+def _node(op: str, inputs: str, outputs: str, **attributes: Any) -> NodeProto:
+    return helper.make_node(op, inputs.split(), outputs.split(), **attributes)
