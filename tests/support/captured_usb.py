@@ -10,7 +10,7 @@ from lobstr_hw.drivers.lighthouse.usb_ids import KNOWN
 from lobstr_hw.drivers.lighthouse.usb_report import ReportKind, UsbReport
 from lobstr_hw.drivers.lighthouse.usbmon import read_usbmon
 
-__all__ = ["devices_of_capture", "scripted"]
+__all__ = ["devices_of_capture", "scripted", "usb_identities"]
 
 LONGEST_PAUSE_S = 1.0
 """One capture has a broken time stamp."""
@@ -26,15 +26,21 @@ def devices_of_capture(path: Path, after_config: bool = False) -> list[ScriptedD
     by_address: dict[int, list[UsbReport]] = defaultdict(list)
     for report in read_usbmon(path):
         by_address[report.device[1]].append(report)
-    devices = []
-    listed = path.with_name(f"{path.name}.usbdevs").read_text(encoding="utf-8").split("\n")
+    return [
+        scripted(vendor, product, address, by_address[address], after_config)
+        for vendor, product, address, _ in usb_identities(path)
+    ]
+
+
+def usb_identities(path: Path) -> list[tuple[int, int, int, tuple[int, ...]]]:
+    """Vendor, product, address and endpoints of a capture's devices, from the file beside it."""
+    listed = path.with_name(f"{path.name}.usbdevs").read_text(encoding="utf-8").splitlines()
+    found = []
     for line in filter(None, listed):
         vendor, product, _, address, _ = line.split()
-        reports = by_address[int(address)]
-        devices.append(
-            scripted(int(vendor), int(product), int(address), reports, after_config=after_config)
-        )
-    return devices
+        ends = KNOWN[int(vendor), int(product)].endpoints
+        found.append((int(vendor), int(product), int(address), ends))
+    return found
 
 
 def scripted(
