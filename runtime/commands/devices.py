@@ -16,6 +16,7 @@ from lobstr_hw.runtime.commands.devices_table import page
 from lobstr_hw.runtime.device_watch import ANSWER_S, DeviceWatch, DriverReport, merged
 from lobstr_hw.runtime.sources import driver_from_spec
 from lobstr_hw.runtime.stopping import StopRequest
+from lobstr_hw.runtime.udev_rules import install_udev_rules
 
 __all__ = ["main"]
 
@@ -27,12 +28,15 @@ EXAMPLES = """examples:
   lobstr-devices
   lobstr-devices --watch
   lobstr-devices --driver polhemus:port=/dev/ttyUSB0 --json
+  lobstr-devices --install-udev-rules
 """
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code."""
     args = _parser().parse_args(argv)
+    if args.install_udev_rules:
+        return install_udev_rules(_tell)
     clock = HostClock()
     watches = [DeviceWatch(spec, asked, clock, _tell) for spec, asked in _specs(args.driver)]
     with StopRequest() as stop:
@@ -76,6 +80,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     add("--watch", action="store_true", help="go on looking until Ctrl-C")
     add("--json", action="store_true", help="one object for each driver, as one JSON document")
+    add(
+        "--install-udev-rules",
+        action="store_true",
+        help="Linux: let whoever sits at this machine use USB devices; asks sudo, looks at none",
+    )
     return parser
 
 
