@@ -62,6 +62,7 @@ class ReportQueue:
                 data = fetch()
                 if data:
                     self._put(RawReport(interface, data, perf_counter()))
+            why = "closed"
         except (LinkLost, OSError) as error:
             why = str(error) or "unplugged"
         finally:
