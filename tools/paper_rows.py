@@ -29,7 +29,11 @@ SETTINGS: dict[str, TrainingConfig] = {
     "gru-paper": replace(BASE, feature_form="paper"),
     "gru-position": replace(BASE, feature_form="position"),
     "gru-combined": replace(BASE, feature_form="combined"),
+    "gru-whole": recipe_config("paper", precision="bf16"),
 }
+WHOLE = "gru-whole"
+"""The paper's recipe with all of its steps, for Table 1 where time allows."""
+
 TABLES: dict[int, dict[str, str]] = {
     1: {"fc6": "FC-6", "cnn1d": "CNN-1D", "rnn": "RNN", "lstm": "LSTM", "gru": "GRU (the paper's)"},
     2: {"gru-p": "P", "gru-pk": "PK", "gru": "PKV"},
