@@ -129,7 +129,7 @@ def _tables(pairs: Sequence[tuple[Case, ...]]) -> list[str]:
     ]
     for name, error, wanted in ROWS:
         before, after = (
-            np.array([np.mean(error(case.take, found)) for case, found in cases])
+            np.array([np.mean(np.asarray(error(case.take, found))) for case, found in cases])
             for cases in (
                 [(case, case.before) for case in first],
                 [(case, case.after) for case in first],

@@ -37,6 +37,7 @@ class Wizard:
     Attributes:
         person: what is known so far.
         done: all stages are through; ``person`` has the calibration.
+        refusals: why tries were wrong, so far.
         refused: every try was wrong; ``failure`` says why.
         stopped: somebody asked for the end.
     """
@@ -56,7 +57,7 @@ class Wizard:
         self.refused = False
         self.stopped = False
         self._plan = list(stages)
-        self._refusals: list[str] = []
+        self.refusals: list[str] = []
         self._restart_at = 0
         self._length_s = countdown_s
         self._now_s = 0.0
@@ -135,8 +136,8 @@ class Wizard:
         said = []
         check = self.person.check
         if check is not None and not check.ok:
-            self._refusals.append(check.reason)
-            if len(self._refusals) == MOST_TRIES:
+            self.refusals.append(check.reason)
+            if len(self.refusals) == MOST_TRIES:
                 self.refused = True
                 return []
             advice = check.failed[0].advice.replace("_", " ")
@@ -196,9 +197,9 @@ class Wizard:
 
     def failure(self) -> CalibrationError:
         """Why it is not done, when nothing more comes."""
-        if self._refusals:
+        if self.refusals:
             return CalibrationError(
-                f"the calibration is refused: {self._refusals[-1]}. Nothing was saved."
+                f"the calibration is refused: {self.refusals[-1]}. Nothing was saved."
             )
         return self.stage.failure()
 

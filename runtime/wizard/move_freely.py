@@ -37,9 +37,9 @@ PARTS = (
 )
 LOG_S = sum(part.seconds for part in PARTS) + 4.0
 """So much of a log after its T-pose is looked at."""
-AGAIN_S = 3.5
-MOST_AGAIN = 3
-"""More than three things to do again would be a second wizard."""
+AGAIN_S = 4.5
+MOST_AGAIN = 2
+"""More than two things to do again would be a second wizard, and the whole take over 30 s."""
 
 
 class MoveFreely(Stage):
@@ -93,8 +93,11 @@ class MoveFreely(Stage):
         if self._asked_again or refinement is None:
             return []
         self._asked_again = True
-        missing = [words[0].upper() + words[1:] + "." for words in refinement.missing]
-        return [Part(f"Once more: {words}", words, AGAIN_S) for words in missing[:MOST_AGAIN]]
+        if not refinement.missing:
+            return []
+        words = ", and ".join(refinement.missing[:MOST_AGAIN])
+        words = words[0].upper() + words[1:] + "."
+        return [Part(f"Once more: {words}", words, AGAIN_S)]
 
     def progress(self) -> float | None:
         """Of the part."""
