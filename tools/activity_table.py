@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from results_page import shown, write_section
+from results_page import write_section
 
 from lobstr_hw.evaluation.activities import Activity, activities
 from lobstr_hw.evaluation.after_ik import Shown, show
@@ -245,16 +245,17 @@ def _studio_table(
 
 
 def _head(args: argparse.Namespace) -> str:
-    studio = " ".join(shown(path) for path in args.other_studio)
+    studio = " ".join(path.name for path in args.other_studio)
     command = "python tools/activity_table.py DATA" + (
         f" --other-studio {studio}" if studio else ""
     )
     date = datetime.datetime.now(tz=datetime.UTC).date()
     return f"""{TITLE}
 
-`{command}`, {date}: `{args.predictor}`, carried, against `{args.against}`
+`{command}`, {date}:
+`{args.predictor}`, carried, against `{args.against}`
 on the same clips. Trackers from the truth, as in the tables of the networks. What people do is told
-frame by frame (lobstr_hw/evaluation/activities.py); a captured room tells nothing of chairs, so
+frame by frame (lobstr_hw/evaluation/activities.py); the trackers do not tell a chair, so
 sitting and crouching share rows. Balanced accuracy is of the network's contacts.
 """
 
