@@ -128,8 +128,8 @@ def _head(table: int, sources: Sources, rows: dict[str, Trained]) -> str:
     today = datetime.datetime.now(tz=datetime.UTC).date()
     fallen = config.learning_rate_decay**run.step
     whole = "\nThe last row of each table is the paper's recipe as it is: 1,500 steps, times 0.999."
-    return f"""`python tools/paper_tables.py DATA OUT --table {table} --steps {run.step}{" --whole" if WHOLE in rows else ""}`,
-{today}.
+    command = f"DATA OUT --table {table} --steps {run.step}" + " --whole" * (WHOLE in rows)
+    return f"""`python tools/paper_tables.py {command}`, {today}.
 
 All rows alike: split `{data["split"]}`, {data["clips"]} clips or pieces of clips,
 {sum(data["minutes_by_set"].values()):.0f} minutes before mirroring; batches of {config.batch}
