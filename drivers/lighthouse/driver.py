@@ -11,13 +11,20 @@ from typing import ClassVar
 from lobstr_hw.drivers.chosen_roles import ROLE_OPTIONS, by_serial, hint
 from lobstr_hw.drivers.driver import BASE_STATION, DeviceInfo, Probe
 from lobstr_hw.drivers.lighthouse.hub import DeviceAbout, Hub
+from lobstr_hw.drivers.lighthouse.raw_recording import RawRecording
 from lobstr_hw.drivers.lighthouse.steamvr import steamvr_runs
 from lobstr_hw.drivers.lighthouse.survey import station_name
 from lobstr_hw.drivers.lighthouse.transport import Transport
 from lobstr_hw.drivers.lighthouse.transports import available_transports, choose_transport
 from lobstr_hw.drivers.stream import StreamDriver
 from lobstr_hw.drivers.vendor import probe_library
-from lobstr_hw.errors import DeviceBusy, DriverUnavailable, StationFileError
+from lobstr_hw.errors import (
+    DeviceBusy,
+    DriverError,
+    DriverUnavailable,
+    OutputError,
+    StationFileError,
+)
 from lobstr_hw.trackers import TrackerRole
 
 __all__ = ["LighthouseDriver"]
@@ -33,6 +40,7 @@ class LighthouseDriver(StreamDriver):
         **ROLE_OPTIONS,
         "stations": Path,
         "transport": str,
+        "raw": Path,
     }
     """What ``--driver lighthouse:...`` understands, and how it is read."""
 
@@ -40,6 +48,7 @@ class LighthouseDriver(StreamDriver):
         self,
         stations: Path | None = None,
         transport: str | Transport | None = None,
+        raw: Path | None = None,
         **serials: str,
     ) -> None:
         """Choose how to reach devices.
@@ -48,10 +57,13 @@ class LighthouseDriver(StreamDriver):
             stations: file of the base stations; it is written when they are found. None: they are
                 found anew each time.
             transport: name of a way to USB, or one that is open to use; None: the best there is.
+            raw: a capture to write of all that goes over USB, for ``lobstr-log import``.
             serials: the serial that stands for each role.
         """
         super().__init__()
         self._path, self._chosen_transport = stations, transport
+        self._raw_path = raw
+        self._raw: RawRecording | None = None
         self._chosen = by_serial(serials)
         self._hub: Hub | None = None
         self._infos: dict[str, DeviceInfo] = {}
@@ -72,10 +84,26 @@ class LighthouseDriver(StreamDriver):
                 raise DeviceBusy("SteamVR has these devices: close it, or take --driver openvr")
             transport = choose_transport(transport)
         try:
+            if self._raw_path is not None:
+                transport = self._raw = RawRecording(transport, self._raw_path)
             self._hub = Hub(transport, self._path)
-        except StationFileError as error:
+        except (StationFileError, OutputError) as error:
+            self._end_raw()
             raise DriverUnavailable(str(error)) from error
+        except DriverError:
+            self._end_raw()
+            raise
         return self._hub
+
+    def close(self) -> None:
+        """Release the devices, and finish the capture."""
+        super().close()
+        self._end_raw()
+
+    def _end_raw(self) -> None:
+        raw, self._raw = self._raw, None
+        if raw is not None:
+            raw.close()
 
     def _begin(self) -> None:
         super()._begin()

@@ -28,6 +28,7 @@ EXAMPLES = """examples:
   lobstr-record take.mcap                               until Ctrl-C
   lobstr-record take.mcap --driver fake --duration 20
   lobstr-record take.mcap --driver openvr --driver polhemus:port=/dev/ttyUSB0,role=pelvis
+  lobstr-record take.mcap --driver lighthouse --raw take.pcap
   lobstr-live --sim take.mcap                           play it again
 """
 
@@ -73,6 +74,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="HZ",
         help="how often devices are asked (90)",
     )
+    add(
+        "--raw",
+        type=Path,
+        metavar="FILE",
+        help="beside the log, all that the driver lighthouse reads from USB; lobstr-log import "
+        "tracks it anew",
+    )
     add("--force", action="store_true", help="replace a file that is there")
     add("--quiet", action="store_true", help="no status lines and no closing words")
     add("--json", action="store_true", help="the outcome on stdout, as one JSON document")
@@ -83,16 +91,36 @@ def _run(args: argparse.Namespace, stop: StopRequest) -> int:
     from lobstr_hw.calibration import load_profile
     from lobstr_hw.runtime.sources import drivers_from_specs
 
-    if args.out.exists() and not args.force:
-        raise OutputError(f"{args.out} exists. Choose another name, or replace it with --force.")
+    for path in filter(None, (args.out, args.raw)):
+        if path.exists() and not args.force:
+            raise OutputError(f"{path} exists. Choose another name, or replace it with --force.")
     try:
-        driver = drivers_from_specs(args.driver, _tell)
+        driver = drivers_from_specs(_specs(args.driver, args.raw), _tell)
     except ValueError as error:
         _tell(f"{error}")
         return 2
     profile = None if args.profile is None else load_profile(args.profile)
     with driver:  # before the file, so that a missing device costs no old recording
         return _record(args, driver, profile, stop)
+
+
+def _specs(specs: Sequence[str], raw: Path | None) -> Sequence[str]:
+    """The drivers, the one that can be told to write down its raw reports.
+
+    Raises:
+        ValueError: none of them can.
+    """
+    from lobstr_hw.drivers import driver_class, split_driver_spec
+
+    if raw is None:
+        return specs
+    specs = list(specs) or ["lighthouse"]
+    for k, spec in enumerate(specs):
+        name, options = split_driver_spec(spec)
+        if "raw" in getattr(driver_class(name), "options", {}):
+            specs[k] = f"{spec}{',' if options else ':'}raw={raw}"
+            return specs
+    raise ValueError("--raw is what goes over USB: it needs --driver lighthouse")
 
 
 def _record(

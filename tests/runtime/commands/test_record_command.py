@@ -130,6 +130,18 @@ def test_an_unknown_driver_to_record_is_wrong_use(
     assert "nosuch" in capsys.readouterr().err
 
 
+def test_raw_needs_the_driver_that_reads_usb(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    raw = tmp_path / "a.pcap"
+    assert main([str(tmp_path / "a.mcap"), *QUICK, "--raw", str(raw)]) == 2
+    assert "--driver lighthouse" in capsys.readouterr().err
+    raw.write_bytes(b"something")
+    assert main([str(tmp_path / "a.mcap"), "--driver", "lighthouse", "--raw", str(raw)]) == 1
+    assert f"{raw} exists" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [raw]
+
+
 class SmallDisk(io.FileIO):
     """A disk that is full after so many bytes."""
 
