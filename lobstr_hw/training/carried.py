@@ -30,6 +30,7 @@ from lobstr_hw.training.kinematics import rotations_from_6d, toes_in_reference
 from lobstr_hw.training.mirrored import shipped
 from lobstr_hw.training.network import LobstrNetwork
 from lobstr_hw.training.recurrence import run_gru
+from lobstr_hw.training.schedule import set_learning_rate
 from lobstr_hw.training.streams import Chunk, Position, Streams
 
 __all__ = ["WholeClip", "held_out_clips", "keep_best", "train_carried", "validate_carried"]
@@ -71,9 +72,7 @@ def _train_step(run: Run, streams: Streams, config: TrainingConfig) -> list[floa
     if run.carried is None:
         raise AssertionError("the state is there from the first step on")
     chunk = streams.next_chunk()
-    learning_rate = config.learning_rate * config.learning_rate_decay**run.step
-    for group in run.optimizer.param_groups:
-        group["lr"] = learning_rate
+    rate = set_learning_rate(run.optimizer, config, run.step)
     run.network.train()
     hidden = run.carried.hidden * torch.from_numpy(~chunk.first)[None, :, None]
     x = torch.from_numpy((chunk.x - run.stats.input_mean) / run.stats.input_scale)
@@ -85,7 +84,7 @@ def _train_step(run: Run, streams: Streams, config: TrainingConfig) -> list[floa
     run.optimizer.step()
     run.carried = Carried(hidden.detach().float(), streams.position)
     values = (terms.total, terms.pose, terms.toe, terms.velocity, terms.contact)
-    return [run.step + 1.0, *(float(v.detach()) for v in values), learning_rate]
+    return [run.step + 1.0, *(float(v.detach()) for v in values), rate]
 
 
 def _through(

@@ -85,6 +85,7 @@ class TwoWaySettings:
     Attributes:
         planted: weight of the velocity term once more, over feet that stand: what they do wrong
             there is skate.
+        cool_down: last steps, over which the learning rate falls to a tenth of what it would be.
         margin: frames at a chunk's end that are not scored, where the recording goes on beyond it.
         end_share: of the chunks' ends that stand for a recording's own; all is scored there but
             ``end_margin`` frames. Each end is drawn by itself.
@@ -92,6 +93,7 @@ class TwoWaySettings:
     """
 
     planted: float = 2.5
+    cool_down: int = 400
     margin: int = 20
     end_share: float = 0.25
     end_margin: int = 2
@@ -112,6 +114,8 @@ class TrainingConfig:
         network: kind of the encoder; all but ``gru`` are for the tables.
         hidden_size: of the encoder.
         learning_rate, learning_rate_decay: Adam, and the factor per step.
+        schedule: ``decay`` by that factor, or ``cosine``: a rise, then half a cosine over the
+            steps; not for ``two-way``, which has its own.
         seed: of the first weights, the windows and their errors.
         precision: ``bf16`` is three times faster on processors that have it.
         device: ``auto`` takes an accelerator where there is one.
@@ -136,6 +140,7 @@ class TrainingConfig:
     hidden_size: int = 1024
     learning_rate: float = 1e-3
     learning_rate_decay: float = 0.999
+    schedule: Literal["decay", "cosine"] = "decay"
     seed: int = 1
     precision: Literal["fp32", "bf16"] = "fp32"
     device: Device = "auto"
@@ -183,11 +188,11 @@ _CARRIED = TrainingConfig(
 _TWO_WAY = replace(
     _CARRIED,
     recipe="two-way",
-    steps=2600,
+    steps=2300,
     window=120,
     # a third of the time per step; no state is carried that could lose its last bits
     precision="bf16",
-    # 0.04 of the first rate after 2600 steps
+    # 0.06 of the first rate after 2300 steps, before what the cool-down takes away
     learning_rate_decay=0.99876,
     # every chunk is an episode of its own
     carried=CarriedSettings(mean_chunks=1.0),

@@ -14,6 +14,7 @@ from lobstr_hw.training.dataset import Clips, Statistics, Windows, draw_windows
 from lobstr_hw.training.devices import precision_of
 from lobstr_hw.training.kinematics import rotations_from_6d, toes_in_reference
 from lobstr_hw.training.losses import Targets, losses
+from lobstr_hw.training.schedule import set_learning_rate
 from lobstr_hw.training.two_way import train_two_way
 
 __all__ = ["CURVE_COLUMNS", "VALIDATION_COLUMNS", "train", "train_step", "validate"]
@@ -58,9 +59,7 @@ def train_step(run: Run, clips: Clips, config: TrainingConfig) -> list[float]:
     """One batch; returns a row of the curve."""
     rng = np.random.default_rng([config.seed, run.step])
     windows = draw_windows(clips, config.batch, config, config.augmentation, rng)
-    learning_rate = config.learning_rate * config.learning_rate_decay**run.step
-    for group in run.optimizer.param_groups:
-        group["lr"] = learning_rate
+    rate = set_learning_rate(run.optimizer, config, run.step)
     run.network.train()
     with precision_of(config):
         pose, logits, _ = run.network(_input(windows, run.stats))
@@ -69,7 +68,7 @@ def train_step(run: Run, clips: Clips, config: TrainingConfig) -> list[float]:
     terms.total.backward()  # type: ignore[no-untyped-call]
     run.optimizer.step()
     values = (terms.total, terms.pose, terms.toe, terms.velocity, terms.contact)
-    return [run.step + 1.0, *(float(v.detach()) for v in values), learning_rate]
+    return [run.step + 1.0, *(float(v.detach()) for v in values), rate]
 
 
 def validate(run: Run, windows: Windows, config: TrainingConfig) -> list[float]:

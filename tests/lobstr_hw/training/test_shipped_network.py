@@ -38,6 +38,7 @@ SMALL = replace(
     average=0.9,
     mirror_mean=True,
     everybody=False,
+    schedule="decay",
     validate_every=4,
     checkpoint_every=3,
 )
@@ -110,6 +111,17 @@ def test_who_is_mirrored_gets_the_mirrored_answer() -> None:
     assert pose_there.numpy() == pytest.approx(mirror_pose_6d(pose.numpy()), abs=1e-5)
     feet = logits.reshape(2, 30, 2, 2)
     assert torch.allclose(logits_there.reshape(2, 30, 2, 2), feet.flip(2), atol=1e-5)
+
+
+def test_the_cosine_rises_falls_without_a_step_up_and_ends_low() -> None:
+    from lobstr_hw.training.schedule import learning_rate
+
+    config = replace(SMALL, steps=2000, learning_rate=1e-3, schedule="cosine")
+    rates = np.array([learning_rate(config, step) for step in range(2000)])
+    top = int(rates.argmax())
+    assert 50 < top < 150 and rates[top] == pytest.approx(1e-3, rel=0.02)
+    assert (np.diff(rates[: top + 1]) > 0.0).all() and (np.diff(rates[top:]) < 0.0).all()
+    assert rates[1000] > 0.4e-3 and rates[-1] < 0.03e-3
 
 
 def trained(clips: Clips, run: "Run") -> "Run":
