@@ -4,6 +4,7 @@ A long recording is run in chunks side by side. Where two overlap, each counts f
 own end, where it knows only one side, and hands over smoothly in between: there is no seam.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,16 +21,17 @@ from lobstr_hw.predictors.predictor import ModelCard
 from lobstr_hw.predictors.weights import NetworkCard, open_session, read_card
 from lobstr_hw.rotations import Array
 
-__all__ = ["TwoWay", "chunk_starts", "chunk_weights", "load_two_way"]
+__all__ = ["TwoWay", "chunk_starts", "chunk_weights", "in_chunks", "load_two_way"]
 
 Float32 = npt.NDArray[np.float32]
 
-CHUNK = 540
-OVERLAP = 180
-"""Frames: 12 s and 4 s. The network remembers some 2 s (docs/experiments.md)."""
-ALONE = 60
-"""Frames at an inner end of a chunk that are left to the neighbour."""
-CHUNKS_AT_ONCE = 32
+CHUNK = 120
+OVERLAP = 60
+"""Frames. A chunk is as long as those in training: from longer ones the network says worse
+(docs/experiments.md)."""
+ALONE = 20
+"""Frames at an inner end of a chunk that are left to the neighbour: those that were not scored."""
+CHUNKS_AT_ONCE = 64
 _OTHER_FOOT = [2, 3, 0, 1]
 
 
@@ -67,18 +69,36 @@ class TwoWay:
 
     def forward(self, x: Array) -> tuple[Array, Array]:
         """Chunk by chunk, once: features (frames, 37), not z-scored -> pose, logits."""
+
+        def ask(chunks: Float32) -> Float32:
+            said = self.session.run(None, {"x": np.ascontiguousarray(chunks.swapaxes(0, 1))})
+            return np.asarray(np.concatenate(said, axis=-1).swapaxes(0, 1))
+
         z = (x.astype(np.float32) - self.network.input_mean) / self.network.input_scale
-        starts = chunk_starts(len(z))
-        length = min(len(z), CHUNK)
-        weights = chunk_weights(starts, length, len(z))
-        out = np.zeros((len(z), POSE_SIZE + 4))
-        for first in range(0, len(starts), CHUNKS_AT_ONCE):
-            some = starts[first : first + CHUNKS_AT_ONCE]
-            chunks = np.stack([z[a : a + length] for a in some], axis=1)
-            said = np.concatenate(self.session.run(None, {"x": chunks}), axis=-1)
-            for k, a in enumerate(some):
-                out[a : a + length] += weights[first + k][:, None] * said[:, k]
+        out = in_chunks(z, ask)
         return out[:, :POSE_SIZE], out[:, POSE_SIZE:]
+
+
+def in_chunks(z: Float32, ask: Callable[[Float32], Float32]) -> Array:
+    """What a network says over a recording of any length, by chunks side by side.
+
+    Args:
+        z: (frames, inputs).
+        ask: chunks (n, frames of a chunk, inputs) -> (n, frames of a chunk, outputs).
+    """
+    starts = chunk_starts(len(z))
+    length = min(len(z), CHUNK)
+    weights = chunk_weights(starts, length, len(z))
+    out: Array | None = None
+    for first in range(0, len(starts), CHUNKS_AT_ONCE):
+        some = starts[first : first + CHUNKS_AT_ONCE]
+        said = ask(np.stack([z[a : a + length] for a in some]))
+        out = np.zeros((len(z), said.shape[-1])) if out is None else out
+        for k, a in enumerate(some):
+            out[a : a + length] += weights[first + k][:, None] * said[k]
+    if out is None:
+        raise AssertionError("there is always a chunk")
+    return out
 
 
 def chunk_starts(frames: int) -> list[int]:

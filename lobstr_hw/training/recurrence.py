@@ -11,7 +11,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-__all__ = ["run_gru"]
+__all__ = ["run_gru", "run_gru_both_ways"]
 
 
 def run_gru(
@@ -28,7 +28,22 @@ def run_gru(
     Returns:
         States (n, frames, H) of all frames, and (1, n, H) the last one; float32.
     """
-    weight_x, weight_h, bias_x, bias_h = gru.parameters()
+    return _one_way(list(gru.parameters()), x, hidden, kind)
+
+
+def run_gru_both_ways(gru: nn.GRU, x: Tensor, kind: torch.dtype = torch.bfloat16) -> Tensor:
+    """What a bidirectional ``gru(x)`` gives from zero states: (n, frames, 2 H), float32."""
+    weights = list(gru.parameters())
+    zero = x.new_zeros(1, len(x), gru.hidden_size)
+    forwards, _ = _one_way(weights[:4], x, zero, kind)
+    backwards, _ = _one_way(weights[4:], x.flip(1), zero, kind)
+    return torch.cat([forwards, backwards.flip(1)], dim=-1)
+
+
+def _one_way(
+    parameters: list[nn.Parameter], x: Tensor, hidden: Tensor, kind: torch.dtype
+) -> tuple[Tensor, Tensor]:
+    weight_x, weight_h, bias_x, bias_h = parameters
     from_x = nn.functional.linear(x.transpose(0, 1).to(kind), weight_x.to(kind)).float() + bias_x
     states = _Recurrence.apply(  # type: ignore[no-untyped-call]
         from_x, hidden[0], weight_h, bias_h, kind

@@ -7,12 +7,13 @@ recording's own ends and are scored, for those exist too.
 """
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
+from lobstr_hw.lower_body import POSE_SIZE
+from lobstr_hw.predictors.two_way import in_chunks
 from lobstr_hw.training.carried import held_out_clips, keep_best, validate_carried
 from lobstr_hw.training.carried_losses import (
     ChunkTargets,
@@ -23,10 +24,14 @@ from lobstr_hw.training.carried_losses import (
 from lobstr_hw.training.checkpoint import Run
 from lobstr_hw.training.config import TrainingConfig, TwoWaySettings
 from lobstr_hw.training.dataset import Clips, Float32
+from lobstr_hw.training.devices import device_of, precision_of
 from lobstr_hw.training.episodes import EpisodeSource
 from lobstr_hw.training.kinematics import toes_in_reference
+from lobstr_hw.training.mirrored import MirrorMean
+from lobstr_hw.training.network import LobstrNetwork
+from lobstr_hw.training.recurrence import run_gru_both_ways
 
-__all__ = ["counted_frames", "planted_term", "train_two_way"]
+__all__ = ["InChunks", "counted_frames", "learning_rate", "planted_term", "train_two_way"]
 
 _MARGINS = 2**32 - 1
 """In a chunk's place in the seed: the generator that says which ends are scored."""
@@ -49,20 +54,19 @@ def train_two_way(
         run.step += 1
         due = run.step % config.validate_every == 0 or run.step == config.steps
         if held_out and due:
-            keep_best(run, [float(run.step), *validate_carried(run.network, held_out)])
+            keep_best(run, [float(run.step), *validate_carried(InChunks(run.network), held_out)])
         yield run
 
 
 def _train_step(run: Run, source: EpisodeSource, config: TrainingConfig) -> list[float]:
     """One batch of chunks; returns a row of the curve."""
-    learning_rate = config.learning_rate * config.learning_rate_decay**run.step
+    rate = learning_rate(run.step, config)
     for group in run.optimizer.param_groups:
-        group["lr"] = learning_rate
+        group["lr"] = rate
     run.network.train()
     x, truth = _batch(source, config, run.step)
     z = torch.from_numpy((x - run.stats.input_mean) / run.stats.input_scale)
-    with _precision(config):
-        pose, logits, _ = run.network(z, last_only=False)
+    pose, logits = _through(run.network, z, config)
     terms = carried_losses(pose, logits, truth, config.weights)
     total = terms.total + config.two_way.planted * planted_term(pose, truth)
     run.optimizer.zero_grad(set_to_none=True)
@@ -70,7 +74,7 @@ def _train_step(run: Run, source: EpisodeSource, config: TrainingConfig) -> list
     torch.nn.utils.clip_grad_norm_(run.network.parameters(), config.carried.gradient_norm)
     run.optimizer.step()
     values = (total, terms.pose, terms.toe, terms.velocity, terms.contact)
-    return [run.step + 1.0, *(float(v.detach()) for v in values), learning_rate]
+    return [run.step + 1.0, *(float(v.detach()) for v in values), rate]
 
 
 def _batch(
@@ -112,5 +116,37 @@ def counted_frames(
     return np.asarray(inside, dtype=np.float32)
 
 
-def _precision(config: TrainingConfig) -> AbstractContextManager[object]:
-    return torch.autocast("cpu", dtype=torch.bfloat16, enabled=config.precision == "bf16")
+def learning_rate(step: int, config: TrainingConfig) -> float:
+    """By the usual decay, and over the last steps down to a tenth of it: the weights settle."""
+    cool_down = min(config.two_way.cool_down, config.steps)
+    cooled = max(step - (config.steps - cool_down), 0) / max(cool_down, 1)
+    return float(config.learning_rate * config.learning_rate_decay**step * 0.1**cooled)
+
+
+def _through(network: LobstrNetwork, z: Tensor, config: TrainingConfig) -> tuple[Tensor, Tensor]:
+    """Pose and logits of chunks, in the precision of the settings; the state is float32."""
+    gru = network.encoder
+    if config.precision == "bf16" and isinstance(gru, nn.GRU) and device_of(config).type == "cpu":
+        return network.heads(run_gru_both_ways(gru, z))
+    with precision_of(config):
+        pose, logits, _ = network(z, last_only=False)
+    return pose, logits
+
+
+class InChunks(nn.Module):
+    """A network over whole clips as it is run over recordings: in chunks, with the mirror image."""
+
+    def __init__(self, network: LobstrNetwork) -> None:
+        """Take a network in training."""
+        super().__init__()
+        self.both = MirrorMean(network)
+
+    def forward(self, z: Tensor, last_only: bool = False) -> tuple[Tensor, Tensor, None]:
+        """One clip z (1, frames, 37), z-scored -> pose (1, frames, 48), logits (1, frames, 4)."""
+
+        def ask(chunks: Float32) -> Float32:
+            pose, logits, _ = self.both(torch.from_numpy(chunks), last_only=False)
+            return np.asarray(torch.cat([pose, logits], dim=-1).numpy())
+
+        said = torch.from_numpy(in_chunks(z[0].numpy(), ask).astype(np.float32))[None]
+        return said[..., :POSE_SIZE], said[..., POSE_SIZE:], None

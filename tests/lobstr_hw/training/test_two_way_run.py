@@ -15,7 +15,13 @@ from lobstr_hw.features import clip_features, clip_points
 from lobstr_hw.lower_body import pose_6d, pose_from_6d
 from lobstr_hw.predictors.two_way import load_two_way
 from lobstr_hw.rotations import rotation_x
-from lobstr_hw.training.config import CarriedSettings, TrainingConfig, recipe_config, write_config
+from lobstr_hw.training.config import (
+    CarriedSettings,
+    TrainingConfig,
+    TwoWaySettings,
+    recipe_config,
+    write_config,
+)
 from lobstr_hw.training.dataset import Clips, save_clips, statistics
 
 if TYPE_CHECKING:
@@ -25,7 +31,14 @@ torch = pytest.importorskip("torch", reason="pip install torch==2.13.0 'lobstr-h
 pytestmark = pytest.mark.torch
 
 SMALL = recipe_config(
-    "two-way", steps=12, batch=4, window=60, hidden_size=16, validate_every=5, checkpoint_every=4
+    "two-way",
+    steps=12,
+    batch=4,
+    window=60,
+    hidden_size=16,
+    two_way=TwoWaySettings(cool_down=4),
+    validate_every=5,
+    checkpoint_every=4,
 )
 
 
@@ -105,6 +118,56 @@ def test_inner_ends_are_not_scored_and_some_ends_are(clips: Clips) -> None:
         assert counted[:, edge].mean() == pytest.approx(settings.end_share, abs=0.03)
     both = counted[:, settings.end_margin] * counted[:, frames - 1 - settings.end_margin]
     assert both.mean() == pytest.approx(settings.end_share**2, abs=0.02), "each end by itself"
+
+
+def test_the_rate_falls_smoothly_and_to_a_tenth_in_the_cool_down() -> None:
+    from lobstr_hw.training.two_way import learning_rate
+
+    config = recipe_config("two-way")
+    rates = np.array([learning_rate(step, config) for step in range(config.steps)])
+    assert rates[0] == config.learning_rate
+    ratio = rates[1:] / rates[:-1]
+    warm = config.steps - config.two_way.cool_down
+    np.testing.assert_allclose(ratio[: warm - 1], config.learning_rate_decay)
+    assert ratio[warm:].max() < ratio[: warm - 1].min()
+    plain = config.learning_rate * config.learning_rate_decay ** (config.steps - 1)
+    assert rates[-1] == pytest.approx(0.1 * plain, rel=0.02)
+
+
+@pytest.mark.parametrize("precision", ["bf16", "fp32"])
+def test_what_is_trained_is_what_the_network_says(clips: Clips, precision: str) -> None:
+    """The fast recurrence of bfloat16 products differs by their rounding only."""
+    from lobstr_hw.training.checkpoint import new_run
+    from lobstr_hw.training.recurrence import run_gru_both_ways
+
+    network = new_run(SMALL, statistics(clips, SMALL)).network
+    z = torch.randn(3, 60, 37, generator=torch.Generator().manual_seed(2))
+    kind = {"bf16": torch.bfloat16, "fp32": torch.float32}[precision]
+    gru = network.encoder
+    assert isinstance(gru, torch.nn.GRU)
+    with torch.no_grad():
+        fast = network.heads(run_gru_both_ways(gru, z, kind))
+        plain = network(z, last_only=False)[:2]
+    for a, b in zip(fast, plain, strict=True):
+        assert float((a - b).abs().max()) < {"bf16": 5e-3, "fp32": 1e-6}[precision]
+
+
+def test_validation_is_in_chunks_with_the_mirror_image_as_recordings_are(
+    exported: tuple["Run", Path], clips: Clips
+) -> None:
+    from lobstr_hw.training.two_way import InChunks
+
+    run, path = exported
+    p, R = (a[: clips.start[1]].astype(np.float64) for a in (clips.p, clips.R))
+    points = clip_points(np.concatenate([p, p[::-1]]), np.concatenate([R, R[::-1]]))
+    assert len(points.p) > 2 * 120
+    x = clip_features(points).astype(np.float32)
+    z = torch.from_numpy((x - run.stats.input_mean) / run.stats.input_scale)
+    with torch.no_grad():
+        pose, logits, _ = InChunks(run.network).eval()(z[None])
+    said, said_logits = load_two_way(path).say(points)
+    np.testing.assert_allclose(said, pose[0].numpy(), atol=2e-3)
+    np.testing.assert_allclose(said_logits, logits[0].numpy(), atol=2e-3)
 
 
 def test_only_feet_that_stand_pay_for_being_planted() -> None:
