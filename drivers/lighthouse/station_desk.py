@@ -4,6 +4,7 @@ One desk for all devices of a driver. It is used by one thread only; a solve, so
 runs beside it in a thread of its own.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +20,9 @@ from lobstr_hw.drivers.lighthouse.survey import SolveRequest, Survey, station_na
 from lobstr_hw.errors import StationsNotSolved
 
 __all__ = ["StationDesk"]
+
+TOLD_SHARES = 4
+"""How often a solve tells how far it is."""
 
 
 class StationDesk:
@@ -53,6 +57,7 @@ class StationDesk:
         self._survey: Survey | None = None
         self._solving: Thread | None = None
         self._news = False
+        self._told_share = 0.0
         self._solved: StationSolution | StationsNotSolved | None = None
         if path is not None and path.exists():
             self.stations = load_stations(path)
@@ -135,9 +140,18 @@ class StationDesk:
     def _solve(self, request: SolveRequest) -> None:
         self._solved = None
         try:
-            self._solved = solve_stations(request.takes, request.calibrations)
+            self._solved = solve_stations(
+                request.takes, request.calibrations, progress=self._progress
+            )
         except StationsNotSolved as error:
             self._solved = error
+
+    def _progress(self, share: float) -> None:
+        """Of the solve; from its own thread."""
+        step = int(share * TOLD_SHARES) / TOLD_SHARES
+        if step > self._told_share and step < 1.0:
+            self._tell(f"Working out where the base stations stand: {step:.0%}.")
+        self._told_share = step
 
     def _take_up(self, survey: Survey, solved: StationSolution | StationsNotSolved | None) -> None:
         if not isinstance(solved, StationSolution):
@@ -147,11 +161,12 @@ class StationDesk:
         if fault:
             self._tell(f"Not yet: {fault}.")
             return
-        joined = keep_known(solved.stations, self.stations) if self.stations else solved.stations
+        known = {n: s for n, s in self.stations.items() if n in survey.known}
+        joined = keep_known(solved.stations, known) if known else solved.stations
         if joined is None:
             self._tell("Not yet: no base station whose place is known was seen with them.")
             return
-        same_world = bool(self.stations) or not self._had_world
+        same_world = bool(known) or not self._had_world
         self.stations, self._had_world = joined, True
         self._by_id = {s.calibration.id: s for s in self.stations.values()}
         self._residual_rad.update(solved.residual_rad)
@@ -166,7 +181,8 @@ class StationDesk:
             f"{station_name(self.stations[n].calibration)} ({1e3 * rad:.2f} mrad)"
             for n, rad in sorted(solved.residual_rad.items())
         ]
-        return f"Base stations found: {', '.join(parts)}"
+        up = f"up is known to {math.degrees(solved.up_sigma_rad):.1f} degrees"
+        return f"Base stations found: {', '.join(parts)}; {up}"
 
     def _kept(self) -> str:
         if self._path is None:

@@ -10,7 +10,7 @@
 5. A place: the lowest view is the floor's height, the lowest-numbered station straight ahead (-Z).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,8 @@ __all__ = ["StationSolution", "solve_stations"]
 
 VIEWS_AT_LEAST = 3
 REPEATS = 2
+VIEWS_SHARE = 0.7
+"""Of the work: the views."""
 MISFIT_RAD = 0.05
 """A view that fits worse in the first map is mirrored or mistaken."""
 
@@ -58,6 +60,7 @@ def solve_stations(
     calibrations: Mapping[int, StationCalibration],
     at_most: int = 48,
     evaluations: int = 60,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> StationSolution:
     """Solve where the stations stand.
 
@@ -66,11 +69,14 @@ def solve_stations(
         calibrations: of the stations, by number; others are left out.
         at_most: moments to use.
         evaluations: of the bundle.
+        progress: is told about the share of the work that is done, 0 to 1.
 
     Raises:
         StationsNotSolved: the stations were not seen well enough.
     """
-    views = find_views(takes, calibrations, at_most=at_most)
+    views = find_views(
+        takes, calibrations, at_most=at_most, progress=lambda share: progress(VIEWS_SHARE * share)
+    )
     if len(views) < VIEWS_AT_LEAST:
         raise StationsNotSolved(
             f"base stations were seen well at {len(views)} moments, {VIEWS_AT_LEAST} are needed:"
@@ -81,12 +87,14 @@ def solve_stations(
     views, guesses = _fitting(views, rough)
     stations, guesses, residual = bundle(rough, [v.hits for v in views], guesses, evaluations)
     upright = measure_up(takes, views, guesses, stations)
-    for _ in range(REPEATS):
+    for k in range(REPEATS):
+        progress(VIEWS_SHARE + (1.0 - VIEWS_SHARE) * (k + 1) / (REPEATS + 1))
         # once more, now that it is known how the devices moved around each view
         level = rotation_between(upright.up, np.array([0.0, 1.0, 0.0]))
         hits = [hits_of(takes[v.take], v, level @ g.R) for v, g in zip(views, guesses, strict=True)]
         stations, guesses, residual = bundle(stations, hits, guesses, evaluations, upright.v)
         upright = measure_up(takes, views, guesses, stations)
+    progress(1.0)
     return StationSolution(
         _placed(stations, guesses, upright.up),
         residual,

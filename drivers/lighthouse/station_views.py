@@ -1,6 +1,6 @@
 """Moments at which a device is seen, and how it lies to each station then: where a solve begins."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,6 +73,7 @@ def find_views(
     calibrations: Mapping[int, StationCalibration],
     spacing_s: float = 0.25,
     at_most: int = 40,
+    progress: Callable[[float], None] | None = None,
 ) -> list[View]:
     """Moments of the takes at which at least one station gives the device's pose.
 
@@ -81,9 +82,15 @@ def find_views(
         calibrations: by the station's number; hits of others are left out.
         spacing_s: between moments.
         at_most: so many, spread over all of the takes.
+        progress: is told the share that is done, 0 to 1.
     """
     moments = [(k, int(t)) for k, take in enumerate(takes) for t in _moments(take, spacing_s)]
-    views = [_view(k, takes[k], t, calibrations) for k, t in _spread(moments, at_most)]
+    chosen = _spread(moments, at_most)
+    views = []
+    for done, (k, t) in enumerate(chosen):
+        views.append(_view(k, takes[k], t, calibrations))
+        if progress is not None:
+            progress((done + 1) / len(chosen))
     return [v for v in views if v is not None]
 
 

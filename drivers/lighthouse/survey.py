@@ -15,17 +15,20 @@ from lobstr_hw.drivers.lighthouse.survey_take import SurveyTake
 
 __all__ = ["SolveRequest", "Survey", "station_name"]
 
-ENOUGH_SEEN, ENOUGH_TOGETHER = 16, 6
+ENOUGH_SEEN, ENOUGH_TOGETHER = 16, 8
 """Quarters of a second in which each station was in view of a moving device; and with another."""
-ENOUGH_MOVING = 32
+ENOUGH_MOVING = 48
+"""Of moving in all: twelve seconds usually tell up to a quarter of a degree."""
 MORE = 20
-"""And so many more before the next try."""
+"""So many more before the next try."""
 TOLD_EVERY = 12
 RESIDUAL_RAD = 1e-3
 """A few tenths are usual."""
-UP_RAD, UP_AT_LAST_RAD = 0.004, 0.02
+UP_RAD, UP_AT_LAST_RAD = 0.005, 0.02
 """How well up should be known; and what has to do when a minute did not tell it better."""
 AT_LAST = 160
+ALONE = 120
+"""Half a minute of moving without a sight of any station whose place is known: there is none."""
 
 FIRST_WORDS = (
     "Where your base stations stand is not known yet. Lay one tracker still on the floor, in sight "
@@ -79,10 +82,11 @@ class Survey:
 
     def want(self, number: int, calibration: StationCalibration) -> None:
         """A station says who it is, and nobody knows where it stands."""
-        known = self.known.pop(number, None)
+        if self.known.pop(number, None) and not self.known:
+            self._tell(FIRST_WORDS)
         news = number not in self.wanted
         self.wanted[number] = calibration
-        if news and not known and not self.known:
+        if news and not self.known:
             names = ", ".join(station_name(c) for _, c in sorted(self.wanted.items()))
             self._tell(f"Base stations heard so far: {names}.")
 
@@ -98,12 +102,14 @@ class Survey:
             return None
         self._say_carry()
         seen = [stations for take in self._takes.values() for stations in take.seen]
+        if self.known and len(seen) >= ALONE and not any(s & set(self.known) for s in seen):
+            self.known = {}  # switched off, or in another room
         self._say_progress(seen)
         if len(seen) < self._next or self._lacks(seen):
             return None
         self._next = len(seen) + MORE
         takes = [take.take() for take in self._takes.values() if take.seen]
-        self._tell("Working out where the base stations stand...")
+        self._tell("Working out where the base stations stand.")
         return SolveRequest(takes, {**self.known, **self.wanted})
 
     def fault(self, solution: StationSolution) -> str:
@@ -139,11 +145,14 @@ class Survey:
     def _lacks(self, seen: Sequence[frozenset[int]]) -> str:
         """What has not been seen often enough."""
         stations = {**self.known, **self.wanted}
+        links = sum(bool(s & set(self.known)) and bool(s & set(self.wanted)) for s in seen)
+        if self.known and links < ENOUGH_TOGETHER:
+            return "no base station whose place is known was seen together with the others."
         for number in sorted(self.wanted):
             name = station_name(stations[number])
             if sum(number in s for s in seen) < ENOUGH_SEEN:
-                return f"{name} has hardly seen it: carry it there."
+                return f"{name} has hardly seen the tracker: carry it there."
             together = sum(number in s and len(s & set(stations)) > 1 for s in seen)
             if len(stations) > 1 and together < ENOUGH_TOGETHER:
-                return f"{name} has hardly seen it together with another base station."
+                return f"{name} has hardly seen the tracker together with another base station."
         return ""

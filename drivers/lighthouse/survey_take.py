@@ -54,6 +54,8 @@ class SurveyTake:
     def add(self, decoded: Decoded) -> bool:
         """The next batch of the device; True: something was kept."""
         if len(decoded.imu):
+            if self._imu and not 0 < decoded.imu.ticks[0] - self._imu[-1].ticks[-1] < CHUNK:
+                self._imu, self._angles = [], []  # it was silent, or its clock began anew
             self._imu.append(decoded.imu)
         if len(decoded.angles):
             self._angles.append(decoded.angles)
@@ -88,8 +90,9 @@ class SurveyTake:
         stations = frozenset(int(n) for n in np.unique(angles.station) if _in_view(angles, int(n)))
         if not stations or self._rests > RESTS:
             return False
-        if self._newest is not None and imu.ticks[0] + self._offset - self._newest > PAUSE:
-            self._offset = self._newest + PAUSE - int(imu.ticks[0])
+        if self._newest is not None:
+            since = int(imu.ticks[0]) + self._offset - self._newest
+            self._offset += 0 if 0 < since <= PAUSE else PAUSE - since
         self._newest = int(imu.ticks[-1]) + self._offset
         self._chunks.append(
             _Chunk(
