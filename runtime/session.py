@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lobstr_hw.avatar import Avatar
+from lobstr_hw.calibration.adjust import in_new_space
 from lobstr_hw.calibration.calibration import Calibration
 from lobstr_hw.errors import CalibrationError
+from lobstr_hw.poses import Pose
 from lobstr_hw.predictors.predictor import Frame, Predictor, State
 from lobstr_hw.rotations import Array
 from lobstr_hw.runtime.changing import Change
@@ -25,6 +27,7 @@ Watcher = Callable[[Sequence[TrackerSample]], Calibration | None]
 """Shown the samples of every tick until it finds a calibration in them."""
 
 
+LEVEL = np.array([1.0, 0.0, 1.0])
 RESTART_AFTER_S = 0.2
 """A state that has given nothing finite for so long is given up."""
 
@@ -57,6 +60,9 @@ class Session:
         presentation: what is shown instead of the body as computed (frozen, seated).
         nonfinite_frames: poses that were not finite and were replaced by the last good one.
     """
+
+    _avatar: Avatar
+    _state: State
 
     def __init__(
         self,
@@ -127,6 +133,22 @@ class Session:
         """
         old = self.aim if self._change is None else self._change.at(now_s)
         self._change = Change(old, calibration, now_s)
+
+    def shift_world(self, T_new_old: Pose) -> None:
+        """The play space was set up anew: the body goes on as if nothing had been.
+
+        Heights over the floor stay what they were, so the floor's own height moves along.
+        """
+        if self.calibration is None:
+            return
+        self.calibration = in_new_space(self.calibration, T_new_old)
+        if self._change is not None:
+            old, new = (in_new_space(c, T_new_old) for c in (self._change.old, self._change.new))
+            self._change = Change(old, new, self._change.since_s)
+        T = np.eye(4)[None]
+        T[:, :3, :3], T[:, :3, 3] = T_new_old.R, T_new_old.p * LEVEL * self.calibration.scale
+        self._state = self._avatar.shift_world(self._state, T)
+        self.presentation.forget_places()
 
     def _changed(self, now_s: float) -> Calibration | None:
         """The calibration at a time."""
