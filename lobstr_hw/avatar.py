@@ -9,7 +9,7 @@ from dataclasses import fields
 import numpy as np
 import numpy.typing as npt
 
-from lobstr_hw.contact import ContactLock, LockSettings, count_contact_steps
+from lobstr_hw.contact import ContactLock, LockSettings
 from lobstr_hw.errors import ModelError
 from lobstr_hw.ik.jacobian import LegPose
 from lobstr_hw.ik.vectors import rotate
@@ -128,7 +128,6 @@ class Avatar:
         for frame in grid:
             inner, prediction = self.predictor.step(inner, frame)
             shown = shown.add(prediction, frame.time_s)
-            lock = count_contact_steps(lock, shown.contact, self._lock)
         return inner, shown, lock
 
     def _given(self, shown: LastTwo, time_s: float) -> Array:

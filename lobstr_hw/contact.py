@@ -8,13 +8,12 @@ same at every rate of the loop.
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from lobstr_hw.ik.vectors import length
+from lobstr_hw.ik.vectors import length, rotate
 from lobstr_hw.predictors.predictor import Bools
 from lobstr_hw.rotations import Array
 
-__all__ = ["ContactLock", "LockSettings", "count_contact_steps", "follow", "release", "toe_target"]
+__all__ = ["ContactLock", "LockSettings", "follow", "release", "smoothed", "toe_target"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,27 +21,28 @@ class LockSettings:
     """When a foot is held and let go.
 
     Attributes:
-        on_probability: at or under this a foot is not locked.
-        on_steps: grid steps in a row above it before the lock closes.
+        on_probability: above it a foot is locked.
         off_probability: under this the lock opens.
         reach: share of the stretched leg (hip to toe base) beyond which it opens.
-        distance_m: from the network's toe beyond which it opens.
+        distance_m: from the network's toe beyond which it opens: how far a stance may be wrong
+            for the sake of standing still.
         close_within_m: from the network's toe within which it may close. Without it a foot let go
-            early is locked again in mid-blend, still far off, and never comes home.
+            early is locked again on its way, still far off, and never comes home.
         floor_within_m: a toe locked nearer than this to its height on the floor is brought there.
         floor_s: how long that takes at most.
-        release_s: of the blend back to the network's toe (the paper's ten frames at 45 Hz).
+        release_s: half-life of what is left of the way home after a release.
+        smooth_s: memory of the filter that takes the trembling off the network's toe.
     """
 
     on_probability: float = 0.6
-    on_steps: int = 2
     off_probability: float = 0.4
     reach: float = 0.99
-    distance_m: float = 0.15
+    distance_m: float = 0.1
     close_within_m: float = 0.05
     floor_within_m: float = 0.03
     floor_s: float = 0.1
-    release_s: float = 10.0 / 45.0
+    release_s: float = 0.06
+    smooth_s: float = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,66 +50,115 @@ class ContactLock:
     """State of the lock, both feet of n people.
 
     Attributes:
+        known: (n,) whether there has been a tick at all.
         on: (n, 2) held.
-        steps: (n, 2) grid steps in a row with a contact above the threshold.
         p_lock: (n, 2, 3) where a locked toe base is held, or was when it was let go; world.
         goal_y: (n, 2) height to which a locked toe base is being brought.
         speed_y: (n, 2) how fast, metres per second.
-        since_release_s: (n, 2) time since the lock opened; the blend is over after release_s.
+        toe: (n, 2, 3) the network's toe bases, smoothed; world.
+        leg: (n, 2, 3) the same from the hip joints, along the world's axes.
+        leg_v: (n, 2, 3) how that changes, metres per second.
+        offset: (n, 2, 3) of the toe shown from the network's, since the lock opened.
+        offset_v: (n, 2, 3) how that changes.
     """
 
+    known: Bools
     on: Bools
-    steps: npt.NDArray[np.int64]
     p_lock: Array
     goal_y: Array
     speed_y: Array
-    since_release_s: Array
+    toe: Array
+    leg: Array
+    leg_v: Array
+    offset: Array
+    offset_v: Array
 
     @staticmethod
     def start(n: int) -> "ContactLock":
-        """Nothing locked, nothing blending."""
+        """Nothing locked, nothing on its way."""
+        flat, points = np.zeros((n, 2)), np.zeros((n, 2, 3))
         return ContactLock(
+            known=np.zeros(n, dtype=np.bool_),
             on=np.zeros((n, 2), dtype=np.bool_),
-            steps=np.zeros((n, 2), dtype=np.int64),
-            p_lock=np.zeros((n, 2, 3)),
-            goal_y=np.zeros((n, 2)),
-            speed_y=np.zeros((n, 2)),
-            since_release_s=np.full((n, 2), 1e6),
+            p_lock=points,
+            goal_y=flat,
+            speed_y=flat,
+            toe=points,
+            leg=points,
+            leg_v=points,
+            offset=points,
+            offset_v=points,
         )
 
     def shifted(self, T: Array) -> "ContactLock":
         """The same lock after the play space moved by T (n, 4, 4), a turn about Y and a shift."""
-        p = (T[:, None, :3, :3] @ self.p_lock[..., None])[..., 0] + T[:, None, :3, 3]
-        return replace(self, p_lock=p, goal_y=self.goal_y + T[:, None, 1, 3])
+        R, shift = T[:, None, :3, :3], T[:, None, :3, 3]
+        return replace(
+            self,
+            p_lock=rotate(R, self.p_lock) + shift,
+            goal_y=self.goal_y + T[:, None, 1, 3],
+            toe=rotate(R, self.toe) + shift,
+            leg=rotate(R, self.leg),
+            leg_v=rotate(R, self.leg_v),
+            offset=rotate(R, self.offset),
+            offset_v=rotate(R, self.offset_v),
+        )
 
 
-def count_contact_steps(
-    lock: ContactLock, probability: Array, settings: LockSettings
-) -> ContactLock:
-    """After a grid step: how many in a row were a contact, from its probability (n, 2)."""
-    steps = np.where(probability > settings.on_probability, lock.steps + 1, 0)
-    return replace(lock, steps=steps)
+def smoothed(
+    lock: ContactLock, toe: Array, p_hip: Array, dt_s: Array, settings: LockSettings
+) -> tuple[ContactLock, Array]:
+    """The network's toe bases (n, 2, 3) without their trembling, and the state that says so.
 
-
-def toe_target(lock: ContactLock, toe: Array, dt_s: Array, settings: LockSettings) -> Array:
-    """Where the toe bases are to be shown at this tick (n, 2, 3), before new locks are told.
+    A filter of fading memory that expects the leg to go on as it goes: what moves steadily is
+    not delayed. It is the leg, not the foot in the world, that is smoothed: how the hips move is
+    measured.
 
     Args:
         lock: the state at the last tick.
-        toe: the network's toe bases at this tick (n, 2, 3).
+        toe: as the network has them at this tick (n, 2, 3).
+        p_hip: upper-leg joints (n, 2, 3).
         dt_s: time since the last tick (n, 1).
         settings: of the lock.
+    """
+    keep = np.exp(-dt_s / settings.smooth_s)[..., None]
+    expected = lock.leg + dt_s[..., None] * lock.leg_v
+    missed = toe - p_hip - expected
+    leg = expected + (1.0 - keep**2) * missed
+    leg_v = lock.leg_v + (1.0 - keep) ** 2 * missed / np.maximum(dt_s, 1e-6)[..., None]
+    known = lock.known[:, None, None]
+    leg, leg_v = np.where(known, leg, toe - p_hip), np.where(known, leg_v, 0.0)
+    return replace(lock, leg=leg, leg_v=leg_v), p_hip + leg
+
+
+def toe_target(
+    lock: ContactLock, toe: Array, dt_s: Array, settings: LockSettings
+) -> tuple[ContactLock, Array]:
+    """Where the toe bases are to be shown at this tick (n, 2, 3), before new locks are told.
+
+    What a foot was off when it was let go is taken away as a critically damped spring does it
+    (its rate is 2 ln 2 / half-life); the foot goes with the network's at once, so that a swing is
+    not shown late.
+
+    Args:
+        lock: the state at the last tick.
+        toe: of :func:`smoothed` (n, 2, 3).
+        dt_s: time since the last tick (n, 1).
+        settings: of the lock.
+
+    Returns:
+        The state with what is left of the way home, and the toe bases.
     """
     step = lock.speed_y * dt_s
     y = lock.p_lock[..., 1]
     y = y + np.clip(lock.goal_y - y, -step, step)
     held = np.stack([lock.p_lock[..., 0], y, lock.p_lock[..., 2]], axis=-1)
-    # shifted sine: slow in, slow out
-    done = np.minimum((lock.since_release_s + dt_s) / settings.release_s, 1.0)
-    weight = (0.5 - 0.5 * np.cos(np.pi * done))[..., None]
-    blended = lock.p_lock + weight * (toe - lock.p_lock)
-    free = np.where(done[..., None] < 1.0, blended, toe)
-    return np.where(lock.on[..., None], held, free)
+    rate, dt = 2.0 * np.log(2.0) / settings.release_s, dt_s[..., None]
+    pull, decay = lock.offset_v + rate * lock.offset, np.exp(-rate * dt)
+    offset = decay * (lock.offset + dt * pull)
+    offset_v = decay * (lock.offset_v - dt * rate * pull)
+    lock = replace(lock, offset=offset, offset_v=offset_v)
+    return lock, np.where(lock.on[..., None], held, toe + offset)
 
 
 def release(
@@ -127,7 +176,7 @@ def release(
     Args:
         lock: the state at the last tick.
         target: of :func:`toe_target` (n, 2, 3).
-        toe: the network's toe bases (n, 2, 3).
+        toe: of :func:`smoothed` (n, 2, 3).
         p_hip: upper-leg joints (n, 2, 3).
         probability: of contact at the newest grid step (n, 2).
         reach_m: length of the stretched leg with its foot (n, 2).
@@ -145,6 +194,7 @@ def follow(
     target: Array,
     toe: Array,
     opens: Bools,
+    probability: Array,
     allowed: Bools,
     dt_s: Array,
     floor_y: Array,
@@ -152,28 +202,35 @@ def follow(
 ) -> ContactLock:
     """The state after this tick: open the locks told, close those that are due.
 
-    A new lock holds the toe base as shown at this moment.
+    A new lock holds the toe base as shown at this moment; one that opens leaves from there, at
+    rest.
 
     Args:
-        lock: the state at the last tick.
+        lock: of :func:`smoothed` and :func:`toe_target`.
         target: toe bases as shown at this tick (n, 2, 3).
-        toe: the network's toe bases (n, 2, 3).
+        toe: of :func:`smoothed` (n, 2, 3).
         opens: of :func:`release`.
-        allowed: (n, 2) where a lock may close.
+        probability: of contact at the newest grid step (n, 2).
+        allowed: (n, 2) where a lock may close; elsewhere a tracker says where the foot is.
         dt_s: time since the last tick (n, 1).
         floor_y: height of a toe base that stands on the floor (n, 1).
         settings: of the lock.
     """
-    stays = lock.on & ~opens
-    at_home = length(target - toe)[..., 0] < settings.close_within_m
-    closes = ~lock.on & (lock.steps >= settings.on_steps) & allowed & at_home
+    off = target - toe
+    at_home = length(off)[..., 0] < settings.close_within_m
+    closes = ~lock.on & (probability > settings.on_probability) & allowed & at_home
     gap = np.abs(floor_y - target[..., 1])
     near = gap < settings.floor_within_m
-    return ContactLock(
-        on=stays | closes,
-        steps=np.where(opens, 0, lock.steps),
+    leaves = (opens | ~allowed)[..., None]
+    toe_v = (toe - lock.toe) / np.maximum(dt_s, 1e-3)[..., None]
+    return replace(
+        lock,
+        known=np.ones_like(lock.known),
+        on=(lock.on & ~opens) | closes,
         p_lock=np.where((lock.on | closes)[..., None], target, lock.p_lock),
         goal_y=np.where(closes, np.where(near, floor_y, target[..., 1]), lock.goal_y),
         speed_y=np.where(closes, np.where(near, gap / settings.floor_s, 0.0), lock.speed_y),
-        since_release_s=np.where(opens, 0.0, lock.since_release_s + dt_s),
+        toe=toe,
+        offset=np.where(leaves, off, lock.offset),
+        offset_v=np.where(leaves, np.where(allowed[..., None], -toe_v, 0.0), lock.offset_v),
     )

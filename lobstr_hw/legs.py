@@ -1,10 +1,10 @@
 """Both legs of a tick: the network's pose, the contact lock, the floor, and IK for both."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from lobstr_hw.contact import ContactLock, LockSettings, follow, release, toe_target
+from lobstr_hw.contact import ContactLock, LockSettings, follow, release, smoothed, toe_target
 from lobstr_hw.floor import FootShape, above_floor, toes_on_floor
 from lobstr_hw.ik.jacobian import LegBones, LegPose, solve_legs
 from lobstr_hw.ik.vectors import length, rotate, unit
@@ -81,20 +81,22 @@ def pose_legs(
     Returns:
         The lock's new state, the pose, and the toes' world rotations (n, 2, 3, 3).
     """
-    toe, R_foot = network.toe(p_hip, body.bones), network.foot
+    R_foot = network.foot
+    lock, toe = smoothed(lock, network.toe(p_hip, body.bones), p_hip, dt_s, settings)
+    lock, held = toe_target(lock, toe, dt_s, settings)
     has_tracker = np.zeros_like(lock.on)
     if tracked is not None:
         has_tracker = tracked.valid
         seen = has_tracker[..., None]
-        toe = np.where(seen, tracked.p + rotate(tracked.R, body.bones.foot), toe)
+        held = np.where(seen, tracked.p + rotate(tracked.R, body.bones.foot), held)
         R_foot = np.where(seen[..., None], tracked.R, R_foot)
-        lock = replace(lock, since_release_s=np.where(has_tracker, 1e6, lock.since_release_s))
-    held = toe_target(lock, toe, dt_s, settings)
     target, R_foot = above_floor(held, R_foot, body.shape)
     target, crowded = clear_of_hip(target, R_foot, p_hip, body)
     opens = release(lock, held, toe, p_hip, contact, body.reach_m, has_tracker, settings)
     opens |= lock.on & crowded
-    lock = follow(lock, target, toe, opens, ~has_tracker, dt_s, body.shape.ball_m, settings)
+    lock = follow(
+        lock, target, toe, opens, contact, ~has_tracker, dt_s, body.shape.ball_m, settings
+    )
     pose = solve_legs(LegPose(network.upper, network.lower, R_foot), p_hip, body.bones, target)
     reached = pose.toe(p_hip, body.bones)
     return lock, pose, toes_on_floor(reached, pose.foot, body.shape)
