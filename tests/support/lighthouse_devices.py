@@ -82,19 +82,17 @@ class Bench:
 
     def settle(self) -> None:
         """Wait until all that came by now has been worked through."""
-        held = [d for d in self.devices if d.opened]
-        before = [d.nothing for d in held]
+        hub, thread = self.driver._hub, self.driver._thread
+        assert hub is not None and thread is not None
+        followed = {key for key, s in dict(hub._sessions).items() if s.tracked is not None}
+        read = {d: d.nothing for d in self.devices if d.opened and d.info.key in followed}
         wait_until(
-            lambda: all(
-                d.nothing > n + 1 or not d.opened for d, n in zip(held, before, strict=True)
-            ),
+            lambda: all(d.nothing > n + 1 or not d.plugged for d, n in read.items()),
             "devices are read",
             60.0,
         )
         self._marks += 1
         mark = Notice(f"mark {self._marks}")
-        hub, thread = self.driver._hub, self.driver._thread
-        assert hub is not None and thread is not None
         hub._inbox.put(mark)
         wait_until(lambda: any(what is mark for _, what in list(thread._arrivals)), "sorted", 60.0)
 

@@ -120,7 +120,7 @@ def test_stations_can_be_told_later_and_taken_away() -> None:
 def test_a_whole_recording_of_events_gives_poses_too() -> None:
     model, motion = device(), carried(5)
     whole, fed = TrackedDevice(model, room(2)), TrackedDevice(model, room(2))
-    reports = reports_of(room(2), model, motion, 2.5)
+    reports = reports_of(room(2), model, motion, 1.5)
     for report in reports:
         whole.reader.feed(report.data)
         fed.feed(report.data)
