@@ -7,13 +7,20 @@ least squares takes the residual from the one and the direction from the other.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lobstr_hw.drivers.lighthouse.angles import Angles, Ints, StationCalibration
-from lobstr_hw.drivers.lighthouse.reprojection import PLANE_TILT, reproject
+from lobstr_hw.drivers.lighthouse.reprojection import (
+    PLANE_TILT,
+    Terms,
+    gen1_angle,
+    gen2_angle,
+    terms_of,
+)
 from lobstr_hw.poses import Pose
 from lobstr_hw.rotations import Array
 
@@ -23,6 +30,9 @@ Flags = NDArray[np.bool_]
 
 OFF_AXIS = math.tan(math.radians(70.0))
 """Gen1 lights 60 degrees to each side, Gen2 75 sideways and 55 up and down; beyond: reflections."""
+NEAREST = 0.05
+"""Metres before a station: nothing is nearer."""
+PLANE_TANGENT = np.tan(PLANE_TILT)
 GEN2_ELEVATION = math.tan(math.radians(57.0))
 """At 60 degrees the tilted planes run parallel to the ray, and the model ends."""
 
@@ -116,54 +126,90 @@ def look(
         angle (m,), its derivative by the point in the world (m, 3), and whether such a hit can be:
         in the station's view, on a sensor that does not look away from it (m,).
     """
-    angle, slope = np.zeros(len(points)), np.zeros((len(points), 3))
-    seen = np.zeros(len(points), dtype=bool)
-    for number in np.unique(station):
-        s, mine = stations[int(number)], np.flatnonzero(station == number)
-        R, generation = s.T_world_station.R, s.calibration.generation
-        p = (points[mine] - s.T_world_station.p) @ R  # R^T (x - c), in rows
-        k = axis[mine]
-        angle[mine] = reproject(s.calibration, p)[np.arange(len(mine)), k]
-        slope[mine] = _ideal_slope(generation, p, k) @ R.T
-        facing = np.einsum("ij,ij->i", normals[mine] @ R, p) < 0.2 * np.linalg.norm(p, axis=1)
-        seen[mine] = facing & _in_view(generation, p)
+    table = _table(tuple(stations.items()))
+    row = table.row[station]
+    R = table.R[row]  # takes a station's frame into the world
+    p = ((points - table.p[row])[:, None] @ R)[:, 0]  # R^T (x - c), in rows
+    x, y, depth = p[:, 0], p[:, 1], -p[:, 2]
+    facing = (normals[:, None] @ R)[:, 0]
+    far = np.sqrt(x * x + y * y + depth * depth)
+    ahead = facing[:, 0] * x + facing[:, 1] * y - facing[:, 2] * depth < 0.2 * far
+    terms = table.terms.pick(2 * row + axis)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        angle, slope, seen = _by_generation(table, row, axis, terms, x, y, depth)
+    return angle, (R @ slope[..., None])[..., 0], seen & ahead
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Table:
+    """All stations in arrays: a window has few hits, and each call of numpy costs as much as ten.
+
+    ``row``: by number; ``terms``: two rows a station.
+    """
+
+    row: Ints
+    R: Array
+    p: Array
+    gen1: Flags
+    terms: Terms
+
+
+@lru_cache(maxsize=32)
+def _table(stations: tuple[tuple[int, Station], ...]) -> _Table:
+    row = np.zeros(1 + max(number for number, _ in stations), dtype=np.int64)
+    row[[number for number, _ in stations]] = np.arange(len(stations))
+    terms = [terms_of(s.calibration) for _, s in stations]
+    return _Table(
+        row,
+        np.stack([s.T_world_station.R for _, s in stations]),
+        np.stack([s.T_world_station.p for _, s in stations]),
+        np.array([s.calibration.generation == 1 for _, s in stations]),
+        Terms(*(np.concatenate([getattr(t, f.name) for t in terms]) for f in fields(Terms))),
+    )
+
+
+def _by_generation(
+    table: _Table, row: Ints, axis: Ints, terms: Terms, x: Array, y: Array, depth: Array
+) -> tuple[Array, Array, Flags]:
+    """Angle, its derivative in the station's frame, and whether it is in view."""
+    if table.gen1.all():
+        return _gen1(axis, terms, x, y, depth)
+    if not table.gen1.any():
+        return _gen2(axis, terms, x, y, depth)
+    angle, slope, seen = _gen2(axis, terms, x, y, depth)
+    i = np.flatnonzero(table.gen1[row])
+    angle[i], slope[i], seen[i] = _gen1(axis[i], terms.pick(i), x[i], y[i], depth[i])
     return angle, slope, seen
 
 
-def _in_view(generation: int, p: Array) -> Flags:
-    x, y, depth = np.abs(p[:, 0]), np.abs(p[:, 1]), -p[:, 2]
-    near = (depth > 0.05) & (x < OFF_AXIS * depth) & (y < OFF_AXIS * depth)
-    if generation == 1:
-        return np.asarray(near)
-    # Gen2's elevation is against the ray's own horizontal length, so it reaches further to the side
-    level = np.hypot(x, depth)
-    return np.asarray((depth > 0.05) & (x < 4.0 * depth) & (y < GEN2_ELEVATION * level))
+def _gen1(axis: Ints, terms: Terms, x: Array, y: Array, depth: Array) -> tuple[Array, Array, Flags]:
+    first = axis == 0
+    along, across = np.where(first, x, y), np.where(first, y, x)
+    angle = gen1_angle(terms, along, across, depth, np.where(first, -1.0, 1.0))
+    # ideal: angle 0 = -atan2(x, -z), angle 1 = atan2(y, -z)
+    sign = np.where(first, -1.0, 1.0) / (along**2 + depth**2)
+    slope = np.empty((len(x), 3))
+    slope[:, 0], slope[:, 1] = depth * sign * first, depth * sign * ~first
+    slope[:, 2] = along * sign
+    reach = OFF_AXIS * depth
+    seen = (depth > NEAREST) & (np.abs(x) < reach) & (np.abs(y) < reach)
+    return angle, slope, seen
 
 
-def _ideal_slope(generation: int, p: Array, axis: Ints) -> Array:
-    """Derivative (m, 3) by the point in the station's frame, of the ideal station's angle."""
-    x, y, z = p[:, 0], p[:, 1], p[:, 2]
-    zero = np.zeros_like(x)
-    if generation == 1:
-        # angle 0 = -atan2(x, -z), angle 1 = atan2(y, -z)
-        side = np.where(axis == 0, x, y)
-        sign = np.where(axis == 0, -1.0, 1.0) / (side**2 + z**2)
-        along, deep = -z * sign, side * sign
-        first = axis == 0
-        return np.stack([np.where(first, along, zero), np.where(first, zero, along), deep], axis=1)
-    # angle = atan2(-z, x) - asin(tan(tilt) y / n) - pi/2 with n = hypot(x, z)
-    square = x**2 + z**2
-    n, tangent = np.sqrt(square), np.tan(PLANE_TILT)[axis]
-    a = np.clip(tangent * y / n, -0.99, 0.99)
-    lift = 1.0 / np.sqrt(1.0 - a**2)
-    return np.stack(
-        [
-            z / square + lift * a * x / square,
-            -lift * tangent / n,
-            -x / square + lift * a * z / square,
-        ],
-        axis=1,
-    )
+def _gen2(axis: Ints, terms: Terms, x: Array, y: Array, depth: Array) -> tuple[Array, Array, Flags]:
+    angle = gen2_angle(terms, x, y, depth)
+    # ideal: atan2(-z, x) - asin(tan(tilt) y / n) - pi/2 with n = hypot(x, z)
+    square = x * x + depth * depth
+    n, tangent = np.sqrt(square), PLANE_TANGENT[axis]
+    a = np.minimum(np.maximum(tangent * y / n, -0.99), 0.99)
+    lift = 1.0 / np.sqrt(1.0 - a * a)
+    slope = np.empty((len(x), 3))
+    slope[:, 0] = (lift * a * x - depth) / square
+    slope[:, 1] = -lift * tangent / n
+    slope[:, 2] = -(x + lift * a * depth) / square
+    # elevation is against the ray's own horizontal length, so it reaches further to the side
+    seen = (depth > NEAREST) & (np.abs(x) < 4.0 * depth) & (np.abs(y) < GEN2_ELEVATION * n)
+    return angle, slope, seen
 
 
 def planes(stations: Stations, hits: Hits) -> tuple[Array, Array]:
