@@ -28,8 +28,9 @@ class LockSettings:
             for the sake of standing still.
         close_within_m: from the network's toe within which it may close. Without it a foot let go
             early is locked again on its way, still far off, and never comes home.
-        floor_within_m: a toe locked nearer than this to its height on the floor is brought there.
-        floor_s: how long that takes at most.
+        floor_within_m: a locked toe stands on the floor while the network's is no further above it
+            than this (or under it); where it is, it goes as high as the network's: on a rung.
+        floor_s: how long that way takes.
         release_s: half-life of what is left of the way home after a release.
         smooth_s: memory of the filter that takes the trembling off the network's toe.
     """
@@ -53,8 +54,6 @@ class ContactLock:
         known: (n,) whether there has been a tick at all.
         on: (n, 2) held.
         p_lock: (n, 2, 3) where a locked toe base is held, or was when it was let go; world.
-        goal_y: (n, 2) height to which a locked toe base is being brought.
-        speed_y: (n, 2) how fast, metres per second.
         toe: (n, 2, 3) the network's toe bases, smoothed; world.
         leg: (n, 2, 3) the same from the hip joints, along the world's axes.
         leg_v: (n, 2, 3) how that changes, metres per second.
@@ -65,8 +64,6 @@ class ContactLock:
     known: Bools
     on: Bools
     p_lock: Array
-    goal_y: Array
-    speed_y: Array
     toe: Array
     leg: Array
     leg_v: Array
@@ -76,13 +73,11 @@ class ContactLock:
     @staticmethod
     def start(n: int) -> "ContactLock":
         """Nothing locked, nothing on its way."""
-        flat, points = np.zeros((n, 2)), np.zeros((n, 2, 3))
+        points = np.zeros((n, 2, 3))
         return ContactLock(
             known=np.zeros(n, dtype=np.bool_),
             on=np.zeros((n, 2), dtype=np.bool_),
             p_lock=points,
-            goal_y=flat,
-            speed_y=flat,
             toe=points,
             leg=points,
             leg_v=points,
@@ -96,7 +91,6 @@ class ContactLock:
         return replace(
             self,
             p_lock=rotate(R, self.p_lock) + shift,
-            goal_y=self.goal_y + T[:, None, 1, 3],
             toe=rotate(R, self.toe) + shift,
             leg=rotate(R, self.leg),
             leg_v=rotate(R, self.leg_v),
@@ -132,7 +126,7 @@ def smoothed(
 
 
 def toe_target(
-    lock: ContactLock, toe: Array, dt_s: Array, settings: LockSettings
+    lock: ContactLock, toe: Array, dt_s: Array, floor_y: Array, settings: LockSettings
 ) -> tuple[ContactLock, Array]:
     """Where the toe bases are to be shown at this tick (n, 2, 3), before new locks are told.
 
@@ -144,14 +138,16 @@ def toe_target(
         lock: the state at the last tick.
         toe: of :func:`smoothed` (n, 2, 3).
         dt_s: time since the last tick (n, 1).
+        floor_y: height of a toe base that stands on the floor (n, 1).
         settings: of the lock.
 
     Returns:
         The state with what is left of the way home, and the toe bases.
     """
-    step = lock.speed_y * dt_s
-    y = lock.p_lock[..., 1]
-    y = y + np.clip(lock.goal_y - y, -step, step)
+    step = settings.floor_within_m / settings.floor_s * dt_s
+    y, toe_y = lock.p_lock[..., 1], toe[..., 1]
+    goal_y = np.where(toe_y - floor_y < settings.floor_within_m, floor_y, toe_y)
+    y = y + np.clip(goal_y - y, -step, step)
     held = np.stack([lock.p_lock[..., 0], y, lock.p_lock[..., 2]], axis=-1)
     rate, dt = 2.0 * np.log(2.0) / settings.release_s, dt_s[..., None]
     pull, decay = lock.offset_v + rate * lock.offset, np.exp(-rate * dt)
@@ -197,7 +193,6 @@ def follow(
     probability: Array,
     allowed: Bools,
     dt_s: Array,
-    floor_y: Array,
     settings: LockSettings,
 ) -> ContactLock:
     """The state after this tick: open the locks told, close those that are due.
@@ -213,14 +208,11 @@ def follow(
         probability: of contact at the newest grid step (n, 2).
         allowed: (n, 2) where a lock may close; elsewhere a tracker says where the foot is.
         dt_s: time since the last tick (n, 1).
-        floor_y: height of a toe base that stands on the floor (n, 1).
         settings: of the lock.
     """
     off = target - toe
     at_home = length(off)[..., 0] < settings.close_within_m
     closes = ~lock.on & (probability > settings.on_probability) & allowed & at_home
-    gap = np.abs(floor_y - target[..., 1])
-    near = gap < settings.floor_within_m
     leaves = (opens | ~allowed)[..., None]
     toe_v = (toe - lock.toe) / np.maximum(dt_s, 1e-3)[..., None]
     return replace(
@@ -228,8 +220,6 @@ def follow(
         known=np.ones_like(lock.known),
         on=(lock.on & ~opens) | closes,
         p_lock=np.where((lock.on | closes)[..., None], target, lock.p_lock),
-        goal_y=np.where(closes, np.where(near, floor_y, target[..., 1]), lock.goal_y),
-        speed_y=np.where(closes, np.where(near, gap / settings.floor_s, 0.0), lock.speed_y),
         toe=toe,
         offset=np.where(leaves, off, lock.offset),
         offset_v=np.where(leaves, np.where(allowed[..., None], -toe_v, 0.0), lock.offset_v),

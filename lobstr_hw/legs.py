@@ -83,7 +83,7 @@ def pose_legs(
     """
     R_foot = network.foot
     lock, toe = smoothed(lock, network.toe(p_hip, body.bones), p_hip, dt_s, settings)
-    lock, held = toe_target(lock, toe, dt_s, settings)
+    lock, held = toe_target(lock, toe, dt_s, body.shape.ball_m, settings)
     has_tracker = np.zeros_like(lock.on)
     if tracked is not None:
         has_tracker = tracked.valid
@@ -94,9 +94,7 @@ def pose_legs(
     target, crowded = clear_of_hip(target, R_foot, p_hip, body)
     opens = release(lock, held, toe, p_hip, contact, body.reach_m, has_tracker, settings)
     opens |= lock.on & crowded
-    lock = follow(
-        lock, target, toe, opens, contact, ~has_tracker, dt_s, body.shape.ball_m, settings
-    )
+    lock = follow(lock, target, toe, opens, contact, ~has_tracker, dt_s, settings)
     pose = solve_legs(LegPose(network.upper, network.lower, R_foot), p_hip, body.bones, target)
     reached = pose.toe(p_hip, body.bones)
     return lock, pose, toes_on_floor(reached, pose.foot, body.shape)

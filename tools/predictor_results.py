@@ -74,7 +74,7 @@ def _measure(options: argparse.Namespace, part: str) -> None:
     missing = [row for row in ROWS if not _path(options.out, part, row).is_file()]
     if not missing:
         return
-    clips = list(_truths(options.data, part))
+    clips = list(truths(options.data, part))
     for row in missing:
         mode: Mode = "windowed" if row == "windowed" else "carried"
         print(f"{part}: {row}", file=sys.stderr, flush=True)
@@ -87,7 +87,7 @@ def _path(out: Path, part: str, row: str) -> Path:
     return out / f"{part}-{row}.json"
 
 
-def _truths(data: Path, part: str) -> Iterator[Truth]:
+def truths(data: Path, part: str) -> Iterator[Truth]:
     """As lobstr-evaluate has them."""
     found = find_clips([data])
     wanted = default_split().parts[part]

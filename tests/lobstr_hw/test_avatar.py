@@ -172,12 +172,8 @@ def test_a_locked_foot_stands_still_at_every_rate(rate_hz: float) -> None:
     both = locked[1:] & locked[:-1]
     moves = np.abs(np.diff(toes, axis=0))
     assert moves[both][:, [0, 2]].max() < 1e-6
-    settled = np.zeros_like(both)
-    steps = int(0.1 * rate_hz) + 1
-    for side in (0, 1):
-        for k in range(steps, len(both)):
-            settled[k, side] = both[k - steps : k + 1, side].all()
-    assert moves[settled][:, 1].max() < 1e-6
+    # up and down it goes with the network's, to the floor and off it, but slowly
+    assert moves[both][:, 1].max() < 0.3 / rate_hz + 1e-6
     assert 0.2 < locked.mean() < 0.8, "it walks: each foot is held a good part of the time"
 
 
