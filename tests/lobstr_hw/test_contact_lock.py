@@ -216,11 +216,12 @@ def test_a_shifted_world_takes_the_held_toe_along() -> None:
     R, shift = rotation_y(0.7), np.array([1.0, 0.3, -2.0])
     T = np.eye(4)[None].copy()
     T[0, :3, :3], T[0, :3, 3] = R, shift
-    rng = np.random.default_rng(7)
-    vectors = {name: rng.normal(size=(1, 2, 3)) for name in ("leg", "leg_v", "offset", "offset_v")}
-    lock = replace(locked(toes()), **vectors)
+    a, b, c, d = np.random.default_rng(7).normal(size=(4, 1, 2, 3))
+    lock = replace(locked(toes()), leg=a, leg_v=b, offset=c, offset_v=d)
     moved = lock.shifted(T)
-    for name in ("p_lock", "toe"):
-        np.testing.assert_allclose(getattr(moved, name), getattr(lock, name) @ R.T + shift)
-    for name, vector in vectors.items():
-        np.testing.assert_allclose(getattr(moved, name), vector @ R.T)
+    np.testing.assert_allclose(moved.p_lock, lock.p_lock @ R.T + shift)
+    np.testing.assert_allclose(moved.toe, lock.toe @ R.T + shift)
+    for was, now in (
+        (a, moved.leg), (b, moved.leg_v), (c, moved.offset), (d, moved.offset_v)
+    ):  # fmt: skip
+        np.testing.assert_allclose(now, was @ R.T)
