@@ -30,7 +30,7 @@ LOOK_S = 1.0
 SETTLE_S = 3.0
 """By then every device has said what it is, by cable or behind a dongle."""
 NOT_FOUND = (
-    "no Lighthouse device on USB: plug in a headset, or a wand, tracker or Knuckles by cable, or "
+    "no Lighthouse device on USB. Plug in a headset, or a wand, tracker or Knuckles by cable, or "
     "the dongle of one that is switched on"
 )
 

@@ -79,6 +79,7 @@ class Bench:
         self.transport = FakeTransport(self.devices)
         self.driver = make(self.transport)
         self._marks = 0
+        self._poll = self.driver.poll
 
     def settle(self) -> None:
         """Wait until all that came by now has been worked through."""
@@ -101,9 +102,13 @@ class Bench:
         samples: list[TrackerSample] = []
         while self.clock.now_s() < end_s - 1e-9:
             self.clock.advance(min(step_s, end_s - self.clock.now_s()))
-            self.settle()
-            samples += self.driver.poll(self.clock.now_s())
+            samples += self.poll(self.clock.now_s())
         return samples
+
+    def poll(self, now_s: float) -> Sequence[TrackerSample]:
+        """The driver's samples, after all that came by now has been worked through."""
+        self.settle()
+        return self._poll(now_s)
 
     def words(self) -> list[str]:
         """The driver's words for its user since the last call."""

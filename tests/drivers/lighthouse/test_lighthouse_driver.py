@@ -343,7 +343,7 @@ def test_what_goes_wrong_with_one_device_is_told_once_and_the_rest_goes_on(
 
 
 def test_where_nothing_is_plugged_in_or_all_is_taken_it_says_so(station_file: Path) -> None:
-    with pytest.raises(TrackerNotFound, match="plug in"):
+    with pytest.raises(TrackerNotFound, match="Plug in"):
         LighthouseDriver(station_file, FakeTransport([])).open()
     taken = HandedOut(one(carried(1), 0.1)[0])
     taken.refusal = DeviceBusy("SteamVR has it")
