@@ -172,26 +172,33 @@ class TrainingConfig:
             )
 
 
-_CARRIED = TrainingConfig(
-    recipe="carried",
-    steps=4000,
+_EPISODES = TrainingConfig(
     batch=64,
     window=60,
     hidden_size=384,
-    # 0.04 of the first rate after 4000 steps
-    learning_rate_decay=0.9992,
+    # less than half the time per step; the state stays float32
+    precision="bf16",
     # the position of three joints guides the legs; the contact gets a gradient that it can feel
     weights=LossWeights(pose=1.0, toe=1.0, velocity=4.5, contact=0.1),
-    validate_every=200,
+)
+
+_CARRIED = replace(
+    _EPISODES,
+    recipe="carried",
+    steps=2400,
+    learning_rate=3e-3,
+    schedule="cosine",
+    average=0.998,
+    mirror_mean=True,
+    validate_every=800,
+    checkpoint_every=100,
 )
 
 _TWO_WAY = replace(
-    _CARRIED,
+    _EPISODES,
     recipe="two-way",
     steps=2300,
     window=120,
-    # a third of the time per step; no state is carried that could lose its last bits
-    precision="bf16",
     # 0.06 of the first rate after 2300 steps, before what the cool-down takes away
     learning_rate_decay=0.99876,
     # every chunk is an episode of its own

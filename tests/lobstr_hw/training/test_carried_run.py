@@ -32,7 +32,16 @@ torch = pytest.importorskip("torch", reason="pip install torch==2.13.0 'lobstr-h
 pytestmark = pytest.mark.torch
 
 SMALL = recipe_config(
-    "carried", steps=12, batch=4, window=15, hidden_size=16, validate_every=5, checkpoint_every=4
+    "carried",
+    steps=12,
+    batch=4,
+    window=15,
+    hidden_size=16,
+    precision="fp32",
+    average=0.0,
+    mirror_mean=False,
+    validate_every=5,
+    checkpoint_every=4,
 )
 
 
