@@ -1,11 +1,14 @@
-"""The network for recordings over clips: every frame of a clip is known when it is asked."""
+"""Clips as recordings: every frame of a clip is known when the networks are asked."""
 
 from collections.abc import Callable, Sequence
+
+import numpy as np
 
 from lobstr_hw.evaluation.rollout import Rollout
 from lobstr_hw.evaluation.truth import Truth
 from lobstr_hw.features import POINT_ROLES, clip_points
-from lobstr_hw.predictors.lobstr import prediction_from_6d
+from lobstr_hw.predictors.lobstr import Lobstr
+from lobstr_hw.predictors.refined import refined_prediction
 from lobstr_hw.predictors.two_way import TwoWay
 from lobstr_hw.trackers import FOUR_POINTS
 
@@ -15,19 +18,25 @@ _ORDER = [FOUR_POINTS.index(role) for role in POINT_ROLES]
 
 
 def roll_out_at_once(
-    two_way: TwoWay, clips: Sequence[Truth], count: Callable[[int], None] = lambda frames: None
+    two_way: TwoWay,
+    live: Lobstr,
+    clips: Sequence[Truth],
+    count: Callable[[int], None] = lambda frames: None,
 ) -> list[Rollout]:
-    """Trackers are made from the truth without noise.
+    """What ``lobstr-log export --refine`` would make of clips.
+
+    Trackers are made from the truth without noise.
 
     Args:
-        two_way: the network.
+        two_way: the network for recordings.
+        live: the one that is asked beside it.
         clips: at its rate.
         count: told of frames done.
     """
     out = []
     for clip in clips:
-        pose, logits = two_way.say(clip_points(clip.p[:, _ORDER], clip.R[:, _ORDER]))
-        said = prediction_from_6d(pose, logits)
+        points = clip_points(clip.p[:, _ORDER], clip.R[:, _ORDER])
+        said = refined_prediction(points, np.arange(len(clip)) > 0, live, two_way)
         if said.C is None:
             raise AssertionError("the network gives C")
         out.append(Rollout(said.R, said.C, said.contact))

@@ -1,7 +1,7 @@
-"""A recording's legs anew: the two-way network where it can see, the live one elsewhere.
+"""A recording's legs anew: both networks' mean where the two-way one can see, else the live one.
 
-Where the two-way part begins or ends inside the recording, it is blended with what the live network
-says there, as the same frames would have been shown live: nothing jumps.
+Where the two-way part begins or ends inside the recording, it is blended into what the live network
+alone says there, as the same frames would have been shown live: nothing jumps.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,13 +11,15 @@ import numpy as np
 from lobstr_hw.features import Points, features, reference_frames
 from lobstr_hw.ik.vectors import smoothstep
 from lobstr_hw.predictors.lobstr import GAP_STEPS, Lobstr, frame_points, prediction_from_6d
-from lobstr_hw.predictors.predictor import Bools, Frame
+from lobstr_hw.predictors.predictor import Bools, Frame, Prediction
 from lobstr_hw.predictors.scripted import Scripted
 from lobstr_hw.predictors.two_way import TwoWay
 from lobstr_hw.rotations import Array
 
-__all__ = ["SHORTEST_S", "clear_stretches", "refined"]
+__all__ = ["SHORTEST_S", "clear_stretches", "refined", "refined_prediction"]
 
+TWO_WAY_SHARE = 0.7
+"""Of the mean; the rest is the live one's, which errs more, but otherwise (docs/experiments.md)."""
 BLEND_S = 0.5
 LOST_S = 1.5
 """Longer losses than in training are left to the live network."""
@@ -43,13 +45,26 @@ def refined(frames: Sequence[Frame], live: Lobstr, two_way: TwoWay) -> Scripted:
     times_s = np.array([frame.time_s for frame in frames])
     points = _points(frames)
     linked = np.diff(times_s, prepend=-np.inf) * rate_hz < GAP_STEPS
+    return Scripted(two_way.card, times_s, refined_prediction(points, linked, live, two_way))
+
+
+def refined_prediction(points: Points, linked: Bools, live: Lobstr, two_way: TwoWay) -> Prediction:
+    """What is to be said of one person's points (frames, 4, ...).
+
+    Args:
+        points: at the networks' rate.
+        linked: (frames,) whether the frame before is one step ago.
+        live: says what would have been shown.
+        two_way: the network for recordings.
+    """
+    rate_hz = live.card.rate_hz
     pose, logits = _live(live, points, linked)
     for a, b in clear_stretches(points.valid_p & points.valid_R, linked, rate_hz):
         better = two_way.say(points.take(slice(a, b)))
-        share = _share(b - a, rate_hz, goes_on=b < len(frames))[:, None]
+        share = _share(b - a, rate_hz, goes_on=b < len(linked))[:, None]
         pose[a:b] += share * (better[0] - pose[a:b])
         logits[a:b] += share * (better[1] - logits[a:b])
-    return Scripted(two_way.card, times_s, prediction_from_6d(pose, logits))
+    return prediction_from_6d(pose, logits)
 
 
 def _points(frames: Sequence[Frame]) -> Points:
@@ -106,7 +121,7 @@ def _long_runs(where: Bools, longest: float) -> Bools:
 def _share(frames: int, rate_hz: float, goes_on: bool) -> Array:
     """Of the two-way network over a stretch; at the end of everything there is nothing to meet."""
     at = np.arange(frames, dtype=np.float64)
-    share = smoothstep(at, 0.0, BLEND_S * rate_hz)
+    share = TWO_WAY_SHARE * smoothstep(at, 0.0, BLEND_S * rate_hz)
     if goes_on:
         share = share * smoothstep(frames - 1.0 - at, 0.0, BLEND_S * rate_hz)
     return share

@@ -26,7 +26,7 @@ __all__ = ["TwoWay", "chunk_starts", "chunk_weights", "in_chunks", "load_two_way
 Float32 = npt.NDArray[np.float32]
 
 CHUNK = 120
-OVERLAP = 60
+OVERLAP = 80
 """Frames. A chunk is as long as those in training: from longer ones the network says worse
 (docs/experiments.md)."""
 ALONE = 20
