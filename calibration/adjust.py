@@ -7,10 +7,11 @@ import numpy as np
 from lobstr_hw.calibration.calibration import Calibration
 from lobstr_hw.calibration.heading import turn_between
 from lobstr_hw.errors import CalibrationError
+from lobstr_hw.poses import Pose
 from lobstr_hw.rotations import Array, heading_angle, rotation_y, slerp, transpose
 from lobstr_hw.trackers import TrackerRole
 
-__all__ = ["between", "with_floor", "with_heading", "with_offsets_of"]
+__all__ = ["between", "in_new_space", "with_floor", "with_heading", "with_offsets_of"]
 
 LARGEST_TURN = np.deg2rad(90.0)
 """Beyond this somebody looks over the shoulder, or the tracker was put on another side."""
@@ -70,6 +71,20 @@ def _joint(
 def with_offsets_of(calibration: Calibration, newer: Calibration) -> Calibration:
     """A later calibration of the same session: its offsets and floor, the body kept."""
     return replace(newer, body=calibration.body, stature_m=calibration.stature_m)
+
+
+def in_new_space(calibration: Calibration, T_new_old: Pose) -> Calibration:
+    """The same calibration after the tracking space was set up anew, by a turn about Y and a shift.
+
+    How trackers sit does not depend on it; where the floor is and where the person faced do. So
+    does where other tracking spaces lie, if they did not move along: those have to be joined again.
+    """
+    turn = float(heading_angle(T_new_old.R)[0])
+    return replace(
+        calibration,
+        floor_m=calibration.floor_m + float(T_new_old.p[1]),
+        heading_rad=float(turn_between(calibration.heading_rad + turn, 0.0)),
+    )
 
 
 def between(old: Calibration, new: Calibration, share: float) -> Calibration:

@@ -87,7 +87,8 @@ def check_devices(calibration: Calibration, seen: Mapping[str, TrackerRole | Non
         if claimed is not None and claimed is not role:
             raise ProfileError(
                 f"{serial} was the {role} when the profile was made and says now that it is the "
-                f"{claimed}. Set its role back, or run lobstr-calibrate."
+                f"{claimed}. Set its role back (its own setting, or role= of --driver), or run "
+                "lobstr-calibrate."
             )
 
 

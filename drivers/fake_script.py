@@ -208,9 +208,17 @@ def _joining(start_s: float) -> Script:
     return replace(script, moves=(swirl, *script.moves), in_hand=held)
 
 
+def _pointing(start_s: float) -> Script:
+    """The same, after stretching out both arms once, so that nameless trackers are told apart."""
+    script = _calibrating(start_s)
+    once = ((0.0, 1.0), (1.0, 1.0), (1.8, 0.0), (3.0, 0.0), (3.8, 1.0))
+    return replace(script, arms=(*once, *script.arms[1:]))
+
+
 SCRIPTS: Mapping[str, Script] = {
     "calibrate": _calibrating(),
     "join": _joining(11.0),
+    "point": _pointing(4.0),
     "gestures": Script(
         arms=((0.0, 0.0), (4.0, 0.0), (5.0, 1.0)),
         presses=(

@@ -27,6 +27,7 @@ class Alarms:
         self._ok_s: dict[TrackerRole, float] = {}
         self._lost: set[TrackerRole] = set()
         self._warned: dict[str, float] = {}
+        self._claimed: dict[str, TrackerRole] = {}
 
     def trackers(self, now_s: float, reports: Mapping[TrackerRole, RoleReport]) -> list[Spoken]:
         """Trackers lost and found again; one that was never there is not lost."""
@@ -45,6 +46,24 @@ class Alarms:
             if lost and role not in self._lost:
                 self._lost.add(role)
                 said.append(Spoken(f"{name} tracker lost.", Sound.TROUBLE))
+        return said
+
+    def roles(
+        self, devices: Sequence[DeviceInfo], roles: Mapping[str, TrackerRole]
+    ) -> list[Spoken]:
+        """Devices that say now that they are something else than the calibration has it."""
+        said = []
+        for device in devices:
+            role, claimed = roles.get(device.serial), device.role_hint
+            if role is None or claimed is None or self._claimed.get(device.serial, role) == claimed:
+                continue
+            self._claimed[device.serial] = claimed
+            if claimed is not role:
+                names = (claimed.replace("_", " "), role.replace("_", " "))
+                words = (
+                    "A tracker says that it is the {}; it still counts as the {}. Calibrate again."
+                )
+                said.append(Spoken(words.format(*names), Sound.TROUBLE))
         return said
 
     def batteries(

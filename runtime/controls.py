@@ -5,25 +5,24 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from lobstr_hw.calibration.adjust import with_floor, with_heading, with_offsets_of
-from lobstr_hw.drivers.driver import TrackerDriver
+from lobstr_hw.drivers.driver import DeviceEvent, EventKind, TrackerDriver
 from lobstr_hw.errors import CalibrationError
 from lobstr_hw.rotations import Array, geodesic_angle, rotation_mean
-from lobstr_hw.runtime.alarms import Alarms
 from lobstr_hw.runtime.announcer import Sound, Spoken
 from lobstr_hw.runtime.calibrating import TPoseWatcher
 from lobstr_hw.runtime.feed import Feed
 from lobstr_hw.runtime.gestures import Command, Gestures
+from lobstr_hw.runtime.lookout import Lookout
 from lobstr_hw.runtime.notices import notices
 from lobstr_hw.runtime.session import Session
-from lobstr_hw.runtime.start_watch import StartWatch
 from lobstr_hw.runtime.ticks import Tick
+from lobstr_hw.runtime.world_shift import Shift, ShiftWatch
 from lobstr_hw.trackers import TrackerRole, TrackerSample
 
 __all__ = ["Controls"]
 
 NUDGE_M = 0.02
 T_POSE_WITHIN_S = 30.0
-DEVICES_EVERY_S = 1.0
 LOOK_BACK_S = 0.25
 """A heading is the mean over so long."""
 
@@ -47,13 +46,11 @@ class Controls:
         """
         self._driver, self._session, self._feed, self._say = driver, session, feed, say
         self._gestures = Gestures(feed.table.of)
-        self._alarms = Alarms()
+        self._lookout = Lookout(driver, session, feed)
         self._was_calibrated = session.calibrated
-        profile = session.calibration  # made before this session, so it may not fit any more
-        self._start_watch = None if profile is None else StartWatch(profile)
+        self._shift_watch = ShiftWatch(feed.table.of)
         self._watcher: TPoseWatcher | None = None
         self._watch_until_s = 0.0
-        self._next_devices_s = 0.0
 
     def __call__(self, tick: Tick, samples: Sequence[TrackerSample]) -> None:
         """One tick."""
@@ -63,10 +60,28 @@ class Controls:
         events = self._driver.events()
         for words in notices(events):
             self._say(Spoken(words))
+        self._recentre(tick.time_s, samples, events)
         for command in self._gestures.add(tick.time_s, events):
             self._say(self._obey(command, tick.time_s))
         self._watch(tick.time_s, samples)
-        self._warn(tick.time_s, samples)
+        for spoken in self._lookout.look(tick.time_s, samples, events):
+            self._say(spoken)
+
+    def _recentre(
+        self, now_s: float, samples: Sequence[TrackerSample], events: Sequence[DeviceEvent]
+    ) -> None:
+        """Take the body along where the play space was set up anew."""
+        recentred = any(event.kind is EventKind.RECENTRED for event in events)
+        found = self._shift_watch.add(now_s, samples, recentred)
+        if found is Shift.APART:
+            words = "The play space was set up anew, and not all trackers moved with it. Calibrate."
+            self._say(Spoken(words, Sound.TROUBLE))
+        elif not isinstance(found, Shift):
+            T_new_old, since_s = found
+            self._feed.shift(T_new_old, since_s)
+            self._session.shift_world(T_new_old)
+            self._lookout.world_moved(now_s)
+            self._say(Spoken("The play space was set up anew; the body moved along."))
 
     def _obey(self, command: Command, now_s: float) -> Spoken:
         if not self._session.calibrated:
@@ -134,18 +149,6 @@ class Controls:
             self._say(Spoken("No T pose seen; all stays as it was.", Sound.TROUBLE))
         if found is not None or now_s >= self._watch_until_s:
             self._watcher = None
-
-    def _warn(self, now_s: float, samples: Sequence[TrackerSample]) -> None:
-        if not self._session.calibrated:
-            return
-        said = self._alarms.trackers(now_s, self._feed.report(now_s))
-        if self._start_watch is not None and not self._start_watch.done:
-            said += self._start_watch.add(now_s, samples)
-        if now_s >= self._next_devices_s:
-            self._next_devices_s = now_s + DEVICES_EVERY_S
-            said += self._alarms.batteries(self._driver.devices(), self._session.roles)
-        for spoken in said:
-            self._say(spoken)
 
 
 _ANSWERS: Mapping[Command, Callable[[Controls, float], Spoken]] = {

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 
+from lobstr_hw.poses import Pose
 from lobstr_hw.rotations import Array
 from lobstr_hw.runtime.gate import Gate
 from lobstr_hw.runtime.resampling import VALID_S, History, Resampled
@@ -41,6 +42,11 @@ class Feed:
         if self.gate.judge(role, sample).believed:
             pose = sample.T_world_tracker
             self._history.add(self.roles.index(role), sample.time_s, pose.p, pose.R)
+
+    def shift(self, T_new_old: Pose, before_s: float) -> None:
+        """The space was set up anew: what came before a time is taken along into it."""
+        self.gate.shift(T_new_old, before_s)
+        self._history.shift(T_new_old, before_s)
 
     def at(self, times_s: Sequence[float]) -> Resampled:
         """Tracker poses of all roles; where one was never heard, the pelvis' pose, not valid."""

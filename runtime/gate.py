@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lobstr_hw.poses import Pose
 from lobstr_hw.rotations import Array
 from lobstr_hw.trackers import TrackerRole, TrackerSample
 
@@ -99,6 +100,14 @@ class Gate:
             self.events[reason] += 1
         self._last_reason[role] = reason
         return Verdict(False, reason) if reason else _GOOD
+
+    def shift(self, T_new_old: Pose, before_s: float) -> None:
+        """The space was set up anew: what was believed before a time stays believed in it."""
+        for role, seen in self._good.items():
+            if seen.time_s < before_s:
+                p = None if seen.p is None else T_new_old.apply(np.array(seen.p)).tolist()
+                self._good[role] = _Seen(seen.time_s, p, seen.p_time_s, T_new_old.R @ seen.R)
+        self._new_place.clear()
 
     def _fault(self, role: TrackerRole, sample: TrackerSample) -> str:
         if not sample.tracked:

@@ -47,6 +47,10 @@ class Presentation:
         self._leave()
         return self.seated
 
+    def forget_places(self) -> None:
+        """The world moved: feet on the floor and poses on the way are not where they were."""
+        self._seat = self._from = None
+
     def _leave(self) -> None:
         """From the pose shown last into whatever comes."""
         self._from = self._shown

@@ -8,6 +8,7 @@ from lobstr_hw.calibration.profile import profile_from_json
 from lobstr_hw.drivers.driver import TrackerDriver
 from lobstr_hw.drivers.replay import ReplayDriver
 from lobstr_hw.errors import ProfileError
+from lobstr_hw.runtime.many_drivers import ManyDrivers
 from lobstr_hw.runtime.profile_path import default_profile_path
 
 __all__ = ["chosen_profile", "spaces_as_before"]
@@ -33,22 +34,42 @@ def chosen_profile(
         ProfileError: it is missing or cannot be used.
     """
     if path is not None:
-        return _checked(load_profile(path), driver)
+        return _checked(load_profile(path), driver, tell)
     if isinstance(driver, ReplayDriver):
         data = driver.log.profile
         return None if data is None else profile_from_json(data.decode(), f"{driver.path}: profile")
     return _own_profile(default_profile_path(), driver, tell)
 
 
-def _checked(profile: Calibration, driver: TrackerDriver) -> Calibration:
+def _checked(
+    profile: Calibration, driver: TrackerDriver, tell: Callable[[str], None]
+) -> Calibration:
     """The profile, unless these are other devices, or the same in other places.
 
     A driver that learns of its devices only while it listens has none yet, and nothing is checked.
     """
+    alone = _alone(profile, driver)
     seen = {device.serial: device.role_hint for device in driver.devices()}
-    if seen:
-        check_devices(profile, seen)
+    try:
+        if seen:
+            check_devices(profile, seen)
+    except ProfileError as error:
+        raise ProfileError(f"{error} {alone}".strip()) from error
+    if alone and not seen:
+        tell(alone)
     return profile
+
+
+def _alone(profile: Calibration, driver: TrackerDriver) -> str:
+    """What to say of a profile of several systems where only one is here; empty otherwise."""
+    if len(profile.tracking_spaces) < 2 or isinstance(driver, ManyDrivers | ReplayDriver):
+        return ""
+    names = list(profile.tracking_spaces)
+    return (
+        f"The profile joins the tracking systems {' and '.join(names)}, and one alone is here. "
+        f"Name all of them: {' '.join(f'--driver {name}' for name in names)}; or calibrate for "
+        "this one: lobstr-calibrate."
+    )
 
 
 def _own_profile(
@@ -58,7 +79,13 @@ def _own_profile(
         return None
     profile = load_profile(path)
     if not set(profile.roles) <= {device.serial for device in driver.devices()}:
-        tell(f"{path} is for other trackers than these; stand in a T-pose to calibrate.")
+        words = f"{path} is for other trackers than these; stand in a T-pose to calibrate."
+        tell(f"{words} {_alone(profile, driver)}".strip())
+        return None
+    try:
+        _checked(profile, driver, tell)
+    except ProfileError as error:
+        tell(f"{path} is not used: {error} Until then: stand in a T-pose to calibrate.")
         return None
     tell(f"calibrated by {path}")
     return profile

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lobstr_hw.poses import Pose
 from lobstr_hw.predictors.predictor import Bools
 from lobstr_hw.rotations import Array, slerp
 
@@ -76,6 +77,11 @@ class _Track:
             values[:n] = values[self.first : self.end]
         self.first, self.end = 0, n
 
+    def shift(self, R: Array, p: Array, before_s: float) -> None:
+        old = slice(self.first, int(np.searchsorted(self.times[: self.end], before_s)))
+        self.p[old] = self.p[old] @ R.T + p
+        self.R[old] = R @ self.R[old]
+
     def around(self, time_s: float) -> tuple[int, int, float, bool]:
         """Samples a, b and the fraction from a to b that stand for a time; whether measured."""
         newest = self.end - 1
@@ -123,6 +129,11 @@ class History:
         """Time of the newest sample; minus infinity when there is none."""
         track = self._tracks[role]
         return float(track.times[track.end - 1]) if track.end else -np.inf
+
+    def shift(self, T_new_old: Pose, before_s: float) -> None:
+        """The space was set up anew: what was said before a time is said in the new one."""
+        for track in self._tracks:
+            track.shift(T_new_old.R, T_new_old.p, before_s)
 
     def at(self, times_s: Sequence[float]) -> Resampled:
         """Poses at some times; a role never seen holds the identity and is not valid."""

@@ -66,3 +66,21 @@ def test_a_charge_that_wavers_at_the_mark_is_told_once_until_charged() -> None:
 
 def test_devices_that_do_not_know_their_charge_are_left_alone() -> None:
     assert not charges(None, None)
+
+
+def test_a_device_that_says_it_is_something_else_is_told_once_and_not_obeyed() -> None:
+    alarms = Alarms()
+    roles = {"A": PELVIS, "B": HEAD}
+
+    def said(claimed: TrackerRole | None) -> list[Spoken]:
+        devices = [DeviceInfo("A", "tracker", role_hint=claimed), DeviceInfo("C", "tracker")]
+        return alarms.roles(devices, roles)
+
+    assert said(None) == said(PELVIS) == []
+    (spoken,) = said(TrackerRole.LEFT_FOOT)
+    assert "left foot" in spoken.text
+    assert "pelvis" in spoken.text
+    assert spoken.sound is Sound.TROUBLE
+    assert said(TrackerRole.LEFT_FOOT) == []
+    assert said(PELVIS) == []
+    assert said(TrackerRole.LEFT_FOOT) != [], "again, after it was right"

@@ -129,6 +129,17 @@ def test_devices_that_say_nothing_are_told_apart_in_any_order(seed: int) -> None
     assert wizard.person.table.roles == {serial: role for role, serial in SERIALS.items()}
 
 
+def test_devices_that_say_nothing_are_calibrated_to_the_end() -> None:
+    driver = FakeDriver(script="point", rate_hz=45.0, named=0)
+    play = Play((FindDevices, StandStill, TakeTPose, MoveFreely), driver).run(60.0)
+    assert play.wizard.done
+    person = play.wizard.person
+    assert person.calibration is not None and person.check is not None
+    assert person.check.ok
+    assert person.calibration.roles == {serial: role for role, serial in SERIALS.items()}
+    assert person.refinement is not None and person.refinement.missing == ()
+
+
 @pytest.mark.parametrize("extra", [0, 2])
 def test_whatever_numbers_are_typed_each_role_stays_with_one_device(extra: int) -> None:
     rng = np.random.default_rng(3)

@@ -11,7 +11,7 @@ from support.beds import need
 from support.terminal_bed import Terminal, in_terminal
 
 from lobstr_hw.calibration import load_profile
-from lobstr_hw.drivers.fake import OTHER_SPACE
+from lobstr_hw.drivers.fake import OTHER_SPACE, SERIALS
 from lobstr_hw.trackers import FOUR_POINTS
 
 pytestmark = pytest.mark.bed
@@ -65,6 +65,20 @@ def test_nameless_trackers_are_told_apart_and_changed_by_number(tmp_path: Path) 
         assert terminal.finish() == 0
     assert "nothing was written" in terminal.text
     assert not path.exists()
+
+
+def test_nameless_trackers_are_calibrated_and_live_knows_them_by_serial(tmp_path: Path) -> None:
+    path, out = tmp_path / "me.json", tmp_path / "live.ndjson"
+    with in_terminal(arguments(path, driver="fake:script=point,named=0")) as terminal:
+        assert terminal.finish(50.0) == 0, terminal.text
+    shows_in_order(terminal, "Stretch both arms out", "Told apart", "T-pose", "Calibration is good")
+    roles = load_profile(path).roles
+    assert {role: serial for serial, role in roles.items()} == SERIALS
+    live = [LIVE, "--driver", "fake:named=0", "--profile", str(path), "--output", f"ndjson:{out}"]
+    with in_terminal([*live, "--duration", "1", "--no-speech"]) as terminal:
+        assert terminal.finish(30.0) == 0, terminal.text
+    last = json.loads(out.read_text(encoding="utf-8").splitlines()[-1])
+    assert set(last["roles"].values()) == {"ok"}
 
 
 @pytest.mark.parametrize("answer", ["n\r", "y\r"])
