@@ -131,13 +131,14 @@ def _recipe(details: dict[str, Any]) -> str:
     config, data = details["configuration"], details["data"]
     minutes = data["minutes_by_set"]
     sets = ", ".join(f"{name} {value}" for name, value in minutes.items())
+    everybody = " --everybody" if config.get("everybody", False) else ""
     return (
         f"`lobstr-train DATA --out RUN --recipe {config['recipe']} --seed {config['seed']} "
-        f"--precision {config['precision']}`: {details['architecture']} "
+        f"--precision {config['precision']}{everybody}`: {details['architecture']} "
         f"({details['parameters']:,} parameters), {_how(config)}, "
         f"{details['steps_done']:,} steps, seed {config['seed']}, products in "
         f"{config['precision']}, {details['wall_s'] / 60.0:.0f} minutes on one thread of a shared "
-        f"two-core machine; the weights of step {details['validation']['step']:,.0f}. Split "
+        f"two-core machine; {_weights(details)}. Split "
         f"`{data['split']}` (`lobstr_hw/training/splits`), "
         f"{data['clips']} clips or pieces of clips, {sum(minutes.values()):.0f} minutes before "
         f"mirroring ({sets}). Nothing was chosen on a test part.\n\n"
@@ -147,6 +148,15 @@ def _recipe(details: dict[str, Any]) -> str:
         "`network` is FK of what was predicted, `after IK` the shown body with contact lock and "
         f"floor; contact after IK is the lock. Measured {date.today().isoformat()}.\n"
     )
+
+
+def _weights(details: dict[str, Any]) -> str:
+    if details["configuration"].get("everybody", False):
+        return (
+            "the mean weights at the end. The validation people were trained on too; settings and "
+            "steps are those of a training without them (docs/experiments.md)"
+        )
+    return f"the weights of step {details['validation']['step']:,.0f}"
 
 
 def _how(config: dict[str, Any]) -> str:
