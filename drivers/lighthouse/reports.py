@@ -94,8 +94,8 @@ Report = ImuReport | PulseReport | SweepReport | BeamReport | RadioReport | Gone
 #
 # 01: by cable, 64 bytes; byte 2 says what follows
 # 1: input                 4: battery; seen on a tracker and a Knuckles at the charger
-# 8  u32 buttons           13 u16 millivolts
-#                          15 u8  bit 7 charging, bits 0-6 percent
+# 8  u32 buttons           12 u16 millivolts
+#                          14 u8  bit 7 charging, bits 0-6 percent
 IMU, PULSES, OLD_PULSES, WORDS, BEAMS = 0x20, 0x25, 0x21, 0x28, 0x27
 RADIO_ONE, RADIO_TWO, GONE = 0x23, 0x24, 0x26
 INPUT, POWER = 1, 4
@@ -167,5 +167,5 @@ def _cable(data: bytes) -> CableReport | None:
     if data[2] == INPUT:
         return CableReport(buttons=int.from_bytes(data[8:12], "little"))
     if data[2] == POWER:
-        return CableReport(battery=min(data[15] & 0x7F, 100) / 100, charging=data[15] >= 0x80)
+        return CableReport(battery=min(data[14] & 0x7F, 100) / 100, charging=data[14] >= 0x80)
     return None

@@ -308,7 +308,7 @@ def test_buttons_and_battery_are_told(clock: FakeClock, station_file: Path) -> N
     with bench.driver as driver:
         bench.run_to(0.2)
         device.put(cable(1, 8, (1 << 13 | 1).to_bytes(4, "little")), 2)
-        device.put(cable(4, 15, bytes([0x80 | 74])), 2)
+        device.put(cable(4, 14, bytes([0x80 | 74])), 2)
         bench.run_to(0.25)
         device.put(cable(1, 8, bytes(4)), 2)
         bench.run_to(0.3)
