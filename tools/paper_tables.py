@@ -127,19 +127,19 @@ def _head(table: int, sources: Sources, rows: dict[str, Trained]) -> str:
     data = json.loads((sources.out / next(iter(rows)) / "data.json").read_text(encoding="utf-8"))
     today = datetime.datetime.now(tz=datetime.UTC).date()
     fallen = config.learning_rate_decay**run.step
-    whole = "\nThe last row of each table is the paper's recipe as it is: 1,500 steps, times 0.999."
     command = f"DATA OUT --table {table} --steps {run.step}" + " --whole" * (WHOLE in rows)
-    return f"""`python tools/paper_tables.py {command}`, {today}.
-
-All rows alike: split `{data["split"]}`, {data["clips"]} clips or pieces of clips,
-{sum(data["minutes_by_set"].values()):.0f} minutes before mirroring; batches of {config.batch}
-windows of {config.window} frames from zero, loss on the last frame, drifting tracker errors, Adam
-from {config.learning_rate:g} times {config.learning_rate_decay} a step (to {fallen:.2f} of it at
-the end), {config.precision} products, hidden {config.hidden_size}, latent 128.
-**{run.step} steps where the paper has 1,500, and one seed**: rows that are close are not in order.
-Scored by windows with products as in training, one second in every {sources.every_s:g} of each
-clip, trackers from the truth; the network alone, before lock and IK. Minutes are of one thread of a
-shared two-core machine.{whole if WHOLE in rows else ""}"""
+    text = f"""All rows alike: split `{data["split"]}`, {data["clips"]} clips or pieces of clips,
+    {sum(data["minutes_by_set"].values()):.0f} minutes before mirroring; batches of {config.batch}
+    windows of {config.window} frames from zero, loss on the last frame, drifting tracker errors,
+    Adam from {config.learning_rate:g} times {config.learning_rate_decay} a step (to {fallen:.2f}
+    of it at the end), {config.precision} products, hidden {config.hidden_size}, latent 128.
+    **{run.step} steps where the paper has 1,500, and one seed**: rows that are close are not in
+    order. Scored by windows with products as in training, one second in every
+    {sources.every_s:g} of each clip, trackers from the truth; the network alone, before lock and
+    IK. Minutes are of one thread of a shared two-core machine."""
+    if WHOLE in rows:
+        text += " The last row is the paper's recipe as it is: 1,500 steps, times 0.999 a step."
+    return f"`python tools/paper_tables.py {command}`, {today}.\n\n{' '.join(text.split())}"
 
 
 def _part_table(
