@@ -25,13 +25,18 @@ from usb_comparison import compare, reports_of_device, takes_and_stations
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from support.captured_usb import devices_of_capture, usb_identities
-from support.lighthouse_bed import RemoteBed
+from support.lighthouse_bed import RemoteBed, use_system_libusb
 from support.scripted_usb import ScriptedDevice, load_script, save_script
 from support.umockdev_beds import SUPPORT, SYSTEM_PYTHON
 
 from lobstr_hw.drivers.lighthouse.device_commands import download_config
 from lobstr_hw.drivers.lighthouse.device_config import inflate_config, join_pieces
-from lobstr_hw.drivers.lighthouse.transport import NoAnswer, OpenDevice, Transport
+from lobstr_hw.drivers.lighthouse.transport import (
+    NoAnswer,
+    OpenDevice,
+    Transport,
+    UsbDeviceInfo,
+)
 from lobstr_hw.drivers.lighthouse.transports import TRANSPORTS
 from lobstr_hw.errors import FileFormatError
 
@@ -71,7 +76,7 @@ def read_capture(
     bed: RemoteBed, transport: Transport, script: Sequence[ScriptedDevice]
 ) -> list[DeviceRead]:
     """Read all devices of the bed at once, to their end."""
-    by_serial = {info.serial: info for info in transport.enumerate()}
+    by_serial = _listed(transport, {device.serial for device in script})
     opened = [transport.open(by_serial[device.serial]) for device in script]
     try:
         configs = [_config_is_right(o, device) for o, device in zip(opened, script, strict=True)]
@@ -88,6 +93,16 @@ def read_capture(
         )
         for device, config, reports in zip(script, configs, came, strict=True)
     ]  # fmt: skip
+
+
+def _listed(transport: Transport, serials: set[str]) -> dict[str, UsbDeviceInfo]:
+    """What is listed, once libusb has heard of what was plugged in and out."""
+    for _ in range(1000):
+        found = {info.serial: info for info in transport.enumerate()}
+        if set(found) == serials:
+            return found
+        time.sleep(0.02)
+    raise SystemExit(f"{transport.name} lists {sorted(found)} instead of {sorted(serials)}")
 
 
 def _config_is_right(opened: OpenDevice, device: ScriptedDevice) -> bool | None:
@@ -185,6 +200,7 @@ def measure(path: Path, transports: Sequence[str]) -> CaptureRow:
 def inside(script: Path, answer: Path, transports: Sequence[str]) -> None:
     """Within the bed: read everything by each transport, and write down what came."""
     devices = load_script(script)
+    use_system_libusb()
     bed = RemoteBed()
     reads = []
     for transport in [t for t in TRANSPORTS if t.name in transports]:

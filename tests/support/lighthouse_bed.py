@@ -6,7 +6,9 @@ import socket
 import sys
 from typing import Any
 
-__all__ = ["ENVIRONMENT", "RemoteBed"]
+from lobstr_hw.drivers.lighthouse import pyusb_transport
+
+__all__ = ["ENVIRONMENT", "RemoteBed", "use_system_libusb"]
 
 ENVIRONMENT = "LOBSTR_USB_BED"
 
@@ -14,6 +16,14 @@ if sys.platform == "win32":
     FAMILY = socket.AF_INET  # never used: for the type checker, which knows no AF_UNIX there
 else:
     FAMILY = socket.AF_UNIX
+
+
+def use_system_libusb() -> None:
+    """Let pyusb use Debian's libusb: it hears of plugs by udev, which umockdev speaks.
+
+    The one of the package libusb-package listens to the kernel itself, which the bed is not.
+    """
+    pyusb_transport.__dict__["libusb_backend"] = lambda: None
 
 
 class RemoteBed:

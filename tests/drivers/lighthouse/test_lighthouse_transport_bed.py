@@ -3,6 +3,7 @@
 The first run of this file has one test, which runs the file again in the bed, with the rest.
 """
 
+import ctypes.util
 import importlib.util
 import os
 import subprocess
@@ -14,11 +15,12 @@ from pathlib import Path
 
 import pytest
 from support.beds import need
-from support.lighthouse_bed import ENVIRONMENT, RemoteBed
+from support.lighthouse_bed import ENVIRONMENT, RemoteBed, use_system_libusb
 from support.lighthouse_room import carried, device, room
 from support.lighthouse_wire import config_of, reports_of
 from support.scripted_usb import ScriptedDevice, load_script, save_script
 from support.umockdev_beds import run_in_bed
+from support.waiting import wait_until
 
 from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S
 from lobstr_hw.drivers.lighthouse.device_commands import (
@@ -45,7 +47,8 @@ BY_CABLE, SILENT_DONGLE, STRANGER = 0, 1, 2
 """The devices of the bed."""
 BATCH = 16
 """Reports under way at once: hidapi keeps 30."""
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
+SERIALS = {"LHR-00000001", "DONGLE", "STRANGER"}
 
 
 def config_reports(compressed: bytes) -> dict[int, list[bytes]]:
@@ -133,6 +136,7 @@ def let_nobody_look() -> None:
 
 
 if ENVIRONMENT in os.environ:
+    use_system_libusb()
 
     @pytest.fixture
     def bed() -> Iterator[RemoteBed]:
@@ -152,9 +156,17 @@ if ENVIRONMENT in os.environ:
     def script() -> list[ScriptedDevice]:
         return load_script(Path(os.environ[SCRIPT]))
 
+    def listed(transport: Transport, serials: set[str]) -> dict[str, UsbDeviceInfo]:
+        """What is listed once libusb has heard of what was plugged in and out."""
+
+        def all_there() -> bool:
+            return {info.serial for info in transport.enumerate()} == serials
+
+        wait_until(all_there, f"{serials} are listed", PATIENCE_S)
+        return {info.serial: info for info in transport.enumerate()}
+
     def info_of(transport: Transport, serial: str) -> UsbDeviceInfo:
-        (info,) = [info for info in transport.enumerate() if info.serial == serial]
-        return info
+        return listed(transport, SERIALS)[serial]
 
     def opened_cable(transport: Transport) -> OpenDevice:
         return transport.open(info_of(transport, "LHR-00000001"))
@@ -164,10 +176,11 @@ if ENVIRONMENT in os.environ:
         def test_every_device_is_listed_once_with_its_kind_and_interfaces(
             self, bed: RemoteBed, transport: Transport
         ) -> None:
-            listed = {
-                i.serial: (i.kind, [n for n, _ in i.interfaces]) for i in transport.enumerate()
-            }
-            assert listed == {
+            found = listed(transport, SERIALS)
+            assert {
+                serial: (info.kind, [number for number, _ in info.interfaces])
+                for serial, info in found.items()
+            } == {
                 "LHR-00000001": (DeviceKind.BY_CONFIG, [0, 1, 2]),
                 "DONGLE": (DeviceKind.DONGLE, [0]),
                 "STRANGER": (DeviceKind.UNKNOWN, [0]),
@@ -224,7 +237,7 @@ if ENVIRONMENT in os.environ:
                     with pytest.raises(LinkLost):
                         opened.send_feature(b"\x04\0\0\0\0")
                 opened.close()
-                assert all(i.serial != info.serial for i in transport.enumerate())
+                listed(transport, SERIALS - {info.serial})
                 with pytest.raises(TrackerNotFound, match="not there any more"):
                     transport.open(info)
                 bed.plug()
@@ -319,6 +332,8 @@ else:
         for module in ("hidraw", "usb"):
             present = importlib.util.find_spec(module) is not None
             need(f"the Python package of {module}", "pip install 'lobstr-hw[lighthouse]'", present)
+        libusb = ctypes.util.find_library("usb-1.0")
+        need("libusb", "apt-get install libusb-1.0-0", libusb is not None)
         script = tmp_path / "script.json"
         save_script(made_up_devices(), script)
         monkeypatch.setenv(SCRIPT, str(script))
