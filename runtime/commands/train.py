@@ -144,7 +144,7 @@ def _train(options: argparse.Namespace) -> int:
         validation = part_of_clips(clips, split, "validation") if held_out else None
         run = _start(out, config, train, options.resume, who)
         if who.first:
-            _write_json(out / "data.json", describe(train, split))
+            _write_json(out / "data.json", describe(train, split) | {"parts": parts})
         _run(out, run, config, (train, validation or None), who)
     return 0
 
