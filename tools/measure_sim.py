@@ -1,18 +1,20 @@
 """What `lobstr-live --sim` gives on a log: the table of docs/results.md.
 
-    python tools/measure_sim.py [LOG] [--rate HZ]
+    python tools/measure_sim.py [LOG] [--rate HZ] [--write]
 
 Hands and head are compared with their calibrated targets (what the devices say, through the
 calibration) and with the joints of the motion that the log was made from, where it has them.
 """
 
 import argparse
+import datetime
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from results_page import write_section
 
 from lobstr_hw.drivers.replay import ReplayDriver
 from lobstr_hw.drivers.tracker_log import TrackerLog
@@ -72,6 +74,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("log", nargs="?", type=Path, default=bundled_log())
     parser.add_argument("--rate", type=float, default=45.0)
+    parser.add_argument("--write", action="store_true", help="put it into docs/results.md")
     args = parser.parse_args()
     options = LiveOptions(rate_hz=args.rate, fast=True, quiet=True)
     with LiveSession(ReplayDriver(args.log), options, print) as live:
@@ -80,11 +83,25 @@ def main() -> int:
         capture = Capture(live)
         live.outputs.append(capture)
         live.run(lambda: False)
-    print(f"{args.log.name}: {log.duration_s:.1f} s, {args.rate:g} Hz\n")
-    print("| what | value |\n|---|---|")
-    for what, value in (*summary_rows(live), *body_rows(live, capture), *truth_rows(log, capture)):
-        print(f"| {what} | {value} |")
+    rows = (*summary_rows(live), *body_rows(live, capture), *truth_rows(log, capture))
+    lines = [f"{args.log.name}: {log.duration_s:.1f} s, {args.rate:g} Hz", ""]
+    lines += ["| what | value |", "|---|---|", *(f"| {what} | {value} |" for what, value in rows)]
+    text = "\n".join([_head(), *lines])
+    print(text)
+    if args.write:
+        write_section(text)
     return 0
+
+
+def _head() -> str:
+    date = datetime.datetime.now(tz=datetime.UTC).date()
+    return f"""## lobstr-live --sim
+
+`python tools/measure_sim.py`, {date}: the bundled log through the whole program, in-process, with
+the shipped network (times on a busy two-core machine). Two runs of `lobstr-live --sim --fast
+--output bvh:out.bvh` give byte-identical files (`cmp`). The shown body is held against its
+calibrated targets and against the source motion's own joints (`/truth` of the log).
+"""
 
 
 def summary_rows(live: LiveSession) -> list[tuple[str, str]]:
