@@ -150,7 +150,7 @@ def run(bed: RemoteBed, folder: Path, transport: str, times: int, pace: float) -
             cable.wait(is_gone)
             cable.plug()
             plugged_s = time.perf_counter()
-            cable.wait(is_tracked)
+            cable.wait(lambda sample: is_tracked(sample) and cable.begun_s is not None)
             assert cable.begun_s is not None
             pluggings.append(Plugging(cable.begun_s - plugged_s, cable.device_s))
     threads = [t for t in threading.enumerate() if t.name.startswith("lobstr")]

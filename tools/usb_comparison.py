@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Ints
 from lobstr_hw.drivers.lighthouse.captured_device import CapturedDevice
 from lobstr_hw.drivers.lighthouse.decoding import DeviceDecoder
 from lobstr_hw.drivers.lighthouse.light import Stations, join_angles
@@ -17,15 +18,23 @@ from lobstr_hw.drivers.lighthouse.usbmon import read_usbmon
 from lobstr_hw.errors import FileFormatError, StationsNotSolved
 from lobstr_hw.rotations import Array
 
+SETTLED_TICKS = TICKS_PER_S
+"""Light before the first IMU sample has no time: there the order decides what is heard at all."""
 
-def takes_and_stations(path: Path) -> tuple[list[RecordedTake], Stations]:
-    """The devices of a capture; no stations where it does not tell where they stand."""
+
+def takes_and_stations(path: Path, solve: bool) -> tuple[list[RecordedTake], Stations]:
+    """The devices of a capture; no stations where it does not tell where they stand.
+
+    Args:
+        path: the capture.
+        solve: find out where the stations stand; else there are none.
+    """
     try:
         takes = read_takes(path)
     except FileFormatError:
         return [], {}
     try:
-        return takes, solve_takes(takes).stations
+        return takes, solve_takes(takes).stations if solve else {}
     except StationsNotSolved:
         return takes, {}
 
@@ -62,11 +71,16 @@ def track(take: RecordedTake, reports: Iterator[UsbReport], stations: Stations) 
 
 
 def far_apart(a: TimedPoses, b: TimedPoses) -> float:
-    """The largest distance between two tracks; infinite if they are not of the same moments."""
-    if not np.array_equal(a.ticks, b.ticks) or not np.array_equal(a.tracked, b.tracked):
+    """The largest difference of two tracks, once settled; infinite if not of the same moments."""
+    i, j = _settled(a.ticks), _settled(b.ticks)
+    if not np.array_equal(a.ticks[i], b.ticks[j]) or not np.array_equal(a.tracked[i], b.tracked[j]):
         return float("inf")
-    turned = np.abs(a.R - b.R).max(initial=0.0)
-    return float(max(np.abs(a.p - b.p).max(initial=0.0), turned))
+    turned = np.abs(a.R[i] - b.R[j]).max(initial=0.0)
+    return float(max(np.abs(a.p[i] - b.p[j]).max(initial=0.0), turned))
+
+
+def _settled(ticks: Ints) -> slice:
+    return slice(int(np.searchsorted(ticks, ticks[:1].sum() + SETTLED_TICKS)), None)
 
 
 def hits(take: RecordedTake, reports: Iterator[UsbReport]) -> Array:
@@ -99,7 +113,9 @@ def compare(
         from_file = track(take, iter(reports), stations)
         other = track(take, reorder(reports, order, ends), stations)
         return int(from_file.tracked.sum()), far_apart(other, from_file)
-    expected, found = hits(take, iter(reports)), hits(take, reorder(reports, order, ends))
+    all_of_file, all_found = hits(take, iter(reports)), hits(take, reorder(reports, order, ends))
+    settled = all_of_file[:1, 0].sum() + SETTLED_TICKS
+    expected, found = (h[h[:, 0] >= settled] for h in (all_of_file, all_found))
     if expected.shape != found.shape:
-        return len(expected), float("inf")
-    return len(expected), float(np.abs(expected - found).max(initial=0.0))
+        return len(all_of_file), float("inf")
+    return len(all_of_file), float(np.abs(expected - found).max(initial=0.0))
