@@ -69,7 +69,7 @@ def _path(options: argparse.Namespace, row: str) -> Path:
 
 
 def _measure(options: argparse.Namespace) -> None:
-    stale = [row for row in ROWS if _is_stale(_path(options, row), options.weights)]
+    stale = [row for row in ROWS if _is_stale(_path(options, row), _weights(options, row))]
     if not stale:
         return
     clips = list(truths(options.data, options.part))
@@ -85,9 +85,12 @@ def _measure(options: argparse.Namespace) -> None:
         _path(options, row).write_text(text + "\n", encoding="utf-8")
 
 
-def _is_stale(path: Path, weights: Path) -> bool:
-    newest = max(w.stat().st_mtime for w in (weights, SHIPPED_WEIGHTS))
-    return not path.is_file() or path.stat().st_mtime < newest
+def _weights(options: argparse.Namespace, row: str) -> list[Path]:
+    return [SHIPPED_WEIGHTS] if row == "live" else [SHIPPED_WEIGHTS, options.weights]
+
+
+def _is_stale(path: Path, weights: list[Path]) -> bool:
+    return not path.is_file() or path.stat().st_mtime < max(w.stat().st_mtime for w in weights)
 
 
 def _section(options: argparse.Namespace) -> str:
