@@ -9,14 +9,15 @@ section 5 and 6). Light corrects it window by window: every hit at its own time,
 one update, in information form since a window has more hits than the state has numbers.
 """
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Angles, DeviceModel
-from lobstr_hw.drivers.lighthouse.inertial import STANDARD_GRAVITY, Track, rotation_steps
+from lobstr_hw.drivers.lighthouse.inertial import STANDARD_GRAVITY, Track, cross, rotation_steps
 from lobstr_hw.drivers.lighthouse.light import Flags, Stations, look
-from lobstr_hw.drivers.lighthouse.refine import Refined, cross_matrix
+from lobstr_hw.drivers.lighthouse.refine import Refined
 from lobstr_hw.rotations import Array
 
 __all__ = [
@@ -26,13 +27,17 @@ __all__ = [
     "advance",
     "correct_with_light",
     "correct_with_rest",
-    "covariances",
+    "covariance",
     "start",
 ]
 
 ERRORS = 15
 POSITION, VELOCITY, ROTATION = slice(0, 3), slice(3, 6), slice(6, 9)
 GYRO_BIAS, ACC_BIAS = slice(9, 12), slice(12, 15)
+AXES = np.arange(3)
+KEEP = np.r_[0:3, 6:9]
+REST = np.r_[3:6, 9:12]
+EYE, EYE9, EYE3 = np.eye(ERRORS), np.eye(9), np.eye(3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,68 +121,59 @@ def start(
     return FilterState(ticks, g.p, g.v, g.R, gyro_bias, acc_bias, P)
 
 
-def _transitions(track: Track) -> Array:
-    """How an error at the track's start shows at each of its moments (n, 15, 15)."""
-    t = (track.ticks - track.ticks[0]) / TICKS_PER_S
-    n, R = len(t), track.R[0]
-    # the mean specific force up to each moment, in the world
-    force = track.a - np.array([0.0, -STANDARD_GRAVITY, 0.0])
-    mean = np.cumsum(force, axis=0) / np.arange(1, n + 1)[:, None]
-    tilt = -cross_matrix(mean) @ R
-    F = np.zeros((n, ERRORS, ERRORS))
-    F[:] = np.eye(ERRORS)
-    t, half = t[:, None, None], 0.5 * (t**2)[:, None, None]
-    F[:, POSITION, VELOCITY] = t * np.eye(3)
-    F[:, POSITION, ROTATION], F[:, VELOCITY, ROTATION] = half * tilt, t * tilt
-    F[:, POSITION, ACC_BIAS], F[:, VELOCITY, ACC_BIAS] = -half * R, -t * R
-    F[:, ROTATION, ROTATION] = np.swapaxes(track.R, 1, 2) @ R
-    F[:, ROTATION, GYRO_BIAS] = -t * np.eye(3)
+def _transition(track: Track) -> Array:
+    """How an error at the track's start shows at its end (15, 15)."""
+    t, R = (track.ticks[-1] - track.ticks[0]) / TICKS_PER_S, track.R[0]
+    # the mean specific force up to there, in the world
+    x, y, z = (np.add.reduce(track.a, axis=0) / len(track.a)).tolist()
+    y += STANDARD_GRAVITY
+    tilt = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]) @ R
+    F = EYE.copy()
+    F[AXES, AXES + 3] = t
+    F[POSITION, ROTATION], F[VELOCITY, ROTATION] = 0.5 * t**2 * tilt, t * tilt
+    F[POSITION, ACC_BIAS], F[VELOCITY, ACC_BIAS] = -0.5 * t**2 * R, -t * R
+    F[ROTATION, ROTATION] = track.R[-1].T @ R
+    F[AXES + 6, AXES + 9] = -t
     return F
 
 
 def _noise(track: Track, settings: FilterSettings, calm: float) -> Array:
-    """Covariance (n, 15, 15) gathered from the track's start to each of its moments."""
-    t = (track.ticks - track.ticks[0]) / TICKS_PER_S
-    Q = np.zeros((len(t), ERRORS, ERRORS))
+    """Covariance (15, 15) gathered along a track."""
+    dt = (track.ticks[1:] - track.ticks[:-1])[:, None] / TICKS_PER_S
+    t = float(track.ticks[-1] - track.ticks[0]) / TICKS_PER_S
     acc, gyro = (settings.acc_noise * calm) ** 2, settings.gyro_noise**2
-    i = np.arange(3)
-    Q[:, i, i] = acc * t[:, None] ** 3 / 3.0
-    Q[:, i, i + 3] = Q[:, i + 3, i] = acc * t[:, None] ** 2 / 2.0
-    Q[:, i + 3, i + 3] = acc * t[:, None]
-    Q[:, i + 6, i + 6] = gyro * t[:, None]
-    Q[:, i + 9, i + 9] = settings.gyro_bias_walk**2 * t[:, None]
-    Q[:, i + 12, i + 12] = settings.acc_bias_walk**2 * t[:, None]
-    sped, turned = _unseen(track.a, t, settings.between), _unseen(track.gyro, t, settings.between)
-    Q[:, i, i] += sped * t[:, None] ** 2 / 3.0
-    Q[:, i, i + 3] += 0.5 * sped * t[:, None]
-    Q[:, i + 3, i] += 0.5 * sped * t[:, None]
-    Q[:, i + 3, i + 3] += sped
-    Q[:, i + 6, i + 6] += turned
+    sped, turned = _unseen(track.a, dt, settings.between), _unseen(track.gyro, dt, settings.between)
+    Q = np.zeros((ERRORS, ERRORS))
+    Q[AXES, AXES] = (acc * t / 3.0 + sped / 3.0) * t**2
+    Q[AXES, AXES + 3] = Q[AXES + 3, AXES] = (acc * t + sped) * t / 2.0
+    Q[AXES + 3, AXES + 3] = acc * t + sped
+    Q[AXES + 6, AXES + 6] = gyro * t + turned
+    Q[AXES + 9, AXES + 9] = settings.gyro_bias_walk**2 * t
+    Q[AXES + 12, AXES + 12] = settings.acc_bias_walk**2 * t
     return Q
 
 
-def _unseen(rate: Array, t: Array, share: float) -> Array:
-    """Variance (n, 1) of the integral of a rate (n, 3) for what it did between its samples."""
-    off = share * np.linalg.norm(np.diff(rate, axis=0), axis=1) * np.diff(t)
-    return np.concatenate([[0.0], np.cumsum(off**2)])[:, None] / 3.0
+def _unseen(rate: Array, dt: Array, share: float) -> float:
+    """Variance of the integral of a rate (n, 3) for what it did between its samples."""
+    off = share * (rate[1:] - rate[:-1]) * dt
+    return float(np.vdot(off, off)) / 3.0
 
 
-def covariances(state: FilterState, track: Track, settings: FilterSettings, calm: float) -> Array:
-    """Covariance (n, 6, 6) of position and rotation at every moment of a track."""
-    keep = np.r_[0:3, 6:9]
-    F = _transitions(track)[:, keep]
-    P = F @ state.P @ np.swapaxes(F, 1, 2)
-    return np.asarray(P + _noise(track, settings, calm)[:, keep[:, None], keep])
+def covariance(state: FilterState, track: Track, settings: FilterSettings, calm: float) -> Array:
+    """Covariance (6, 6) of position and rotation at a track's end."""
+    F = _transition(track)[KEEP]
+    return np.asarray(F @ state.P @ F.T + _noise(track, settings, calm)[KEEP[:, None], KEEP])
 
 
 def advance(
     state: FilterState, track: Track, settings: FilterSettings, calm: float = 1.0
 ) -> FilterState:
     """The state at a track's end, from the IMU alone."""
-    F = _transitions(track)[-1]
-    P = F @ state.P @ F.T + _noise(track, settings, calm)[-1]
-    return replace(
-        state, ticks=int(track.ticks[-1]), p=track.p[-1], v=track.v[-1], R=track.R[-1], P=P
+    F = _transition(track)
+    P = F @ state.P @ F.T + _noise(track, settings, calm)
+    end = int(track.ticks[-1])
+    return FilterState(
+        end, track.p[-1], track.v[-1], track.R[-1], state.gyro_bias, state.acc_bias, P
     )
 
 
@@ -201,17 +197,17 @@ def correct_with_light(
     """
     error, H, seen = _light_residuals(state, track, angles, model, stations)
     P9 = state.P[:9, :9]
-    spread = np.sum((H @ P9) * H, axis=1) + settings.hit_sigma_rad**2
-    good = seen & (error**2 < settings.gate_sigmas**2 * spread)
+    spread = np.add.reduce((H @ P9) * H, axis=1) + settings.hit_sigma_rad**2
+    good = seen & (error * error < settings.gate_sigmas**2 * spread)
     used = int(np.count_nonzero(good))
     if used == 0:
         return state, LightReport(len(angles), 0, 0.0)
     H, e = H[good], error[good]
-    rms = float(np.sqrt(np.mean(e**2)))
+    rms = math.sqrt(float(e @ e) / used)
     weight = settings.hit_sigma_rad**-2
     A, b = weight * (H.T @ H), weight * (H.T @ e)
     # K = P H^T (H P H^T + V)^-1 = P[:, :9] (1 + A P9)^-1 H^T V^-1
-    gain = state.P[:, :9] @ np.linalg.inv(np.eye(9) + A @ P9)
+    gain = state.P[:, :9] @ np.linalg.inv(EYE9 + A @ P9)
     P = state.P - gain @ A @ state.P[:9]
     return inject(state, gain @ b, P), LightReport(len(angles), used, rms)
 
@@ -220,16 +216,17 @@ def _light_residuals(
     state: FilterState, track: Track, angles: Angles, model: DeviceModel, stations: Stations
 ) -> tuple[Array, Array, Flags]:
     """Angles (m,) missed by, their derivative (m, 9) by the errors at the end, possible (m,)."""
-    j = np.clip(np.searchsorted(track.ticks, angles.ticks, side="right") - 1, 0, None)
+    j = np.maximum(np.searchsorted(track.ticks, angles.ticks, side="right") - 1, 0)
     dt = ((angles.ticks - track.ticks[j]) / TICKS_PER_S)[:, None]
     back = ((angles.ticks - track.ticks[-1]) / TICKS_PER_S)[:, None]
     R = track.R[j] @ rotation_steps(track.gyro[j] * dt)
-    p = track.p[j] + track.v[j] * dt + 0.5 * track.a[j] * dt**2
-    r = np.einsum("mij,mj->mi", R, model.points[angles.sensor])
-    n = np.einsum("mij,mj->mi", R, model.normals[angles.sensor])
-    angle, slope, seen = look(stations, angles.station, angles.axis, p + r, n)
-    turn = -np.cross(slope, r) @ state.R
-    H = np.concatenate([slope, back * slope, turn], axis=1)
+    p = track.p[j] + dt * (track.v[j] + 0.5 * dt * track.a[j])
+    both = np.stack([model.points[angles.sensor], model.normals[angles.sensor]], axis=2)
+    turned = R @ both  # (m, 3, 2)
+    r = turned[..., 0]
+    angle, slope, seen = look(stations, angles.station, angles.axis, p + r, turned[..., 1])
+    H = np.empty((len(angle), 9))
+    H[:, :3], H[:, 3:6], H[:, 6:] = slope, back * slope, cross(r, slope) @ state.R
     return angles.angle_rad - angle, H, seen
 
 
@@ -237,19 +234,20 @@ def correct_with_rest(
     state: FilterState, gyro_mean: Array, settings: FilterSettings
 ) -> FilterState:
     """Correct by lying still: no speed, and what the gyroscope says is its bias."""
-    rows = np.r_[3:6, 9:12]
-    V = np.r_[[settings.rest_speed_sigma**2] * 3, [settings.rest_gyro_sigma**2] * 3]
-    S = state.P[np.ix_(rows, rows)] + np.diag(V)
-    gain = np.linalg.solve(S, state.P[rows]).T
+    rows = state.P[REST]
+    S = rows[:, REST]
+    S[AXES, AXES] += settings.rest_speed_sigma**2
+    S[AXES + 3, AXES + 3] += settings.rest_gyro_sigma**2
+    gain = np.linalg.solve(S, rows).T
     e = np.concatenate([-state.v, gyro_mean - state.gyro_bias])
-    return inject(state, gain @ e, state.P - gain @ state.P[rows])
+    return inject(state, gain @ e, state.P - gain @ rows)
 
 
 def inject(state: FilterState, x: Array, P: Array) -> FilterState:
     """Move the nominal state by an error (15,), which is then none (Sola 2017, section 6.2)."""
     R = state.R @ rotation_steps(x[None, ROTATION])[0]
     # one Newton step keeps it a rotation through hours of products
-    R = R @ (1.5 * np.eye(3) - 0.5 * (R.T @ R))
+    R = R @ (1.5 * EYE3 - 0.5 * (R.T @ R))
     return FilterState(
         state.ticks,
         state.p + x[POSITION],

@@ -31,7 +31,11 @@ def reacquire(
         return state
     gyro_bias = np.zeros(3) if state.filter is None else state.filter.gyro_bias
     hits = gather(model, angles, state.imu, end, gyro_bias)
-    fit = _fit(state, stations, hits, end, settings)
+    fit = _by_rotation(state, stations, hits, end, settings)
+    # dear, hence seldom: a device that is not seen enough would stall the others
+    if fit is None and end - state.looked >= settings.search_s * TICKS_PER_S:
+        state = replace(state, looked=end)
+        fit = _from_nothing(state, stations, hits, settings)
     if fit is None:
         return state
     begun = _begin_at(state, fit, angles, end, model, stations, settings)
@@ -99,18 +103,21 @@ def _begin_at(
     return replace(state, filter=fresh, light=int(angles.ticks[-1]), rms_rad=fit.rms_rad)
 
 
-def _fit(
+def _by_rotation(
     state: TrackerState, stations: Stations, hits: Hits, end: int, settings: TrackerSettings
 ) -> Refined | None:
-    """A pose good enough to start from: by the known rotation, else from nothing."""
+    """A pose good enough to start from, by the rotation that the gyroscope has kept."""
     f = state.filter
-    if f is not None and end - state.light < settings.rotation_known_s * TICKS_PER_S:
-        fit = seed_with_rotation(stations, hits, f.R)
-        if fit is not None and _is_good(stations, hits, fit, settings):
-            return fit
-    # dear, hence not in every window: a device that is not seen enough would stall the others
-    if (end // settings.window) % settings.search_windows:
+    if f is None or end - state.light >= settings.rotation_known_s * TICKS_PER_S:
         return None
+    fit = seed_with_rotation(stations, hits, f.R)
+    return fit if fit is not None and _is_good(stations, hits, fit, settings) else None
+
+
+def _from_nothing(
+    state: TrackerState, stations: Stations, hits: Hits, settings: TrackerSettings
+) -> Refined | None:
+    """A pose good enough to start from, any rotation being possible."""
     up = state.imu.acc_g[-8:].mean(axis=0)
     fit = seed(stations, hits, up / max(float(np.linalg.norm(up)), 1e-9))
     return fit if fit is not None and _is_good(stations, hits, fit, settings) else None

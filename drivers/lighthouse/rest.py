@@ -15,21 +15,27 @@ def is_still(state: TrackerState, end: int, settings: TrackerSettings) -> bool:
     if j - i < 8 or state.imu.ticks[i] > end - 0.8 * settings.rest_s * TICKS_PER_S:
         return False
     gyro, acc = state.imu.gyro_rad_s[i:j], state.imu.acc_g[i:j]
-    f = state.filter
-    if (
-        gyro.std(axis=0).max() > settings.rest_gyro_rad_s
-        or acc.std(axis=0).max() > settings.rest_acc_g
-    ):
+    mean, variance = _spread(gyro)
+    if variance > settings.rest_gyro_rad_s**2 or _spread(acc)[1] > settings.rest_acc_g**2:
         return False
+    f = state.filter
     if f is None:
         return True
-    turning = np.linalg.norm(gyro.mean(axis=0) - f.gyro_bias)
+    turning = mean - f.gyro_bias
     return bool(
-        turning < 5.0 * settings.rest_gyro_rad_s and np.linalg.norm(f.v) < settings.rest_speed_m_s
+        turning @ turning < (5.0 * settings.rest_gyro_rad_s) ** 2
+        and f.v @ f.v < settings.rest_speed_m_s**2
     )
+
+
+def _spread(x: Array) -> tuple[Array, float]:
+    """Mean (3,), and the largest of the variances, of rows (n, 3)."""
+    mean = np.add.reduce(x, axis=0) / len(x)
+    off = x - mean
+    return mean, float((np.add.reduce(off * off, axis=0) / len(x)).max())
 
 
 def rest_gyro(state: TrackerState, end: int, settings: TrackerSettings) -> Array:
     """The gyroscope's mean (3,) over that while."""
     i, j = np.searchsorted(state.imu.ticks, [end - int(settings.rest_s * TICKS_PER_S), end])
-    return np.asarray(state.imu.gyro_rad_s[i:j].mean(axis=0))
+    return np.asarray(np.add.reduce(state.imu.gyro_rad_s[i:j], axis=0) / (j - i))

@@ -28,9 +28,9 @@ AROUND_S = 0.02
 """Hits so far from the moment belong to it: a turn of the rotors each way."""
 FIT_RAD = 1e-3
 """A view whose hits fit worse is a wrong one."""
-OUTLIER, OUTLIER_RAD, TRUE_AT_LEAST = 6.0, 1e-3, 0.7
+OUTLIER, OUTLIER_RAD, TRUE_AT_LEAST = 6.0, 1e-3, 0.85
 """Hits so many times further off than the middle one, and so far, are reflections: a device that
-lies still sees the same one all the time."""
+lies still sees the same one all the time. Where more are off, the pose may be the mirrored one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,6 +152,7 @@ def _alone(station: Station, hits: Hits) -> tuple[Pose, float, Flags] | None:
     error = np.abs(residuals({number: station}, hits, fit.guess)[0])
     true = error < max(OUTLIER * float(np.median(error)), OUTLIER_RAD)
     rms = float(np.sqrt(np.mean(error[true] ** 2)))
-    if rms > FIT_RAD or np.mean(true) < TRUE_AT_LEAST:
+    enough = np.mean(true) >= TRUE_AT_LEAST and np.count_nonzero(true) >= HITS_AT_LEAST
+    if rms > FIT_RAD or not enough:
         return None
     return Pose(fit.guess.R, fit.guess.p), rms, true

@@ -1,6 +1,6 @@
 """Reports of one device in, its timed poses out: one way for what comes live and what is on file.
 
-    report ──► DeviceReader ─► every 8 ms of device time ─► DeviceDecoder ─► tracker.step ─► poses
+    report ──► DeviceReader ─► every 12 ms of device time ─► DeviceDecoder ─► tracker.step ─► poses
 
 What was heard is worked through at fixed places of the device's own time, each as soon as an IMU
 sample has passed it. So poses follow from the order of the reports and from nothing else: neither
@@ -33,7 +33,7 @@ from lobstr_hw.drivers.lighthouse.tracker import (
 
 __all__ = ["TrackedDevice"]
 
-STEP = 8 * TICKS_PER_S // 1000
+STEP = 12 * TICKS_PER_S // 1000
 """Ticks between two places: the length of the tracker's windows of light."""
 LONGEST = TICKS_PER_S
 """The tracker is given no more at once; it copies what it has not used at every window."""

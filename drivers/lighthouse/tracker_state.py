@@ -11,7 +11,7 @@ from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Angles, ImuSamples,
 from lobstr_hw.drivers.lighthouse.kalman import FilterSettings, FilterState
 from lobstr_hw.rotations import Array
 
-__all__ = ["Fix", "PoseBatch", "TrackerSettings", "TrackerState", "begin", "join_poses"]
+__all__ = ["Fix", "PoseBatch", "Tail", "TrackerSettings", "TrackerState", "begin", "join_poses"]
 
 
 class Fix(IntEnum):
@@ -30,7 +30,7 @@ class TrackerSettings:
     """Times and limits of tracking.
 
     Attributes:
-        window: ticks of light that are used together: about one sweep.
+        window: ticks of light that are used together: a sweep or two. The work is per window.
         lag: ticks that light may come later than the IMU: by radio 10 to 25 ms, by cable 3 to 10
             and, of Knuckles, up to 29. Waiting costs little: dead reckoning over 30 ms drifts by a
             tenth of a millimetre.
@@ -41,8 +41,8 @@ class TrackerSettings:
         seed_span_s: they must cover so much: velocity is told by time.
         seed_rms_rad: a new pose must fit so well.
         seed_outlier_rad: hits further from a new pose than this are reflections.
-        seed_sigma_m: and be known so well.
-        search_windows: a pose from nothing, some 40 ms of work, is looked for so seldom.
+        seed_sigma_m: and be known so well; more light has to confirm it.
+        search_s: a pose from nothing, some 40 ms of work, is looked for no sooner again.
         rotation_known_s: after so long without light the gyroscope's rotation is forgotten.
         lost_sigma_m: a position less certain than this is none.
         disagree_windows: so many windows in a row whose light does not fit: the pose is wrong.
@@ -58,7 +58,7 @@ class TrackerSettings:
         filter: of the Kalman filter.
     """
 
-    window: int = 8 * TICKS_PER_S // 1000
+    window: int = 12 * TICKS_PER_S // 1000
     lag: int = 30 * TICKS_PER_S // 1000
     inertial_s: float = 0.075
     lost_s: float = 0.1
@@ -66,11 +66,11 @@ class TrackerSettings:
     seed_span_s: float = 0.02
     seed_rms_rad: float = 1e-3
     seed_outlier_rad: float = 3e-3
-    seed_sigma_m: float = 0.03
-    search_windows: int = 16
+    seed_sigma_m: float = 0.06
+    search_s: float = 0.12
     rotation_known_s: float = 5.0
     lost_sigma_m: float = 0.1
-    disagree_windows: int = 8
+    disagree_windows: int = 6
     doubt_share: float = 0.6
     doubt_hits: float = 12.0
     doubt_s: float = 0.1
@@ -110,14 +110,33 @@ class PoseBatch:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Tail:
+    """How far dead reckoning from the filter has come: the last pose given.
+
+    Attributes:
+        ticks: of an IMU sample.
+        p, v: (3,).
+        R: (3, 3).
+        covariance: (6, 6) of position and rotation, of all poses until the next window.
+    """
+
+    ticks: int
+    p: Array
+    v: Array
+    R: Array
+    covariance: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class TrackerState:
     """All that tracking one device remembers.
 
     Attributes:
-        filter: at the end of the last window, or None before the first pose.
+        filter: at the last IMU sample of the last window, or None before the first pose.
+        tail: from there on; None where there is no filter.
         imu: samples still needed: the last rest_s, and all after the filter's moment.
         angles: hits still needed, by time.
-        window_end: ticks; windows up to here are done.
+        window_end: ticks, a multiple of a window's; windows up to here are done.
         given: ticks of the last pose given.
         light: ticks of the last hit that was believed.
         lost: the position is not followed.
@@ -126,11 +145,12 @@ class TrackerState:
         still: at rest.
         disagreed: windows in a row whose light did not fit.
         seen, believed: hits of late, those longer ago counting less.
-        looked: ticks of the last look for another pose.
+        looked: ticks of the last look for a pose from nothing, or for another one.
         rms_rad: of the hits believed last.
     """
 
     filter: FilterState | None
+    tail: Tail | None
     imu: ImuSamples
     angles: Angles
     window_end: int
@@ -161,6 +181,7 @@ def begin() -> TrackerState:
     never = -(2**62)
     return TrackerState(
         filter=None,
+        tail=None,
         imu=_no_imu(),
         angles=_no_angles(),
         window_end=never,
