@@ -1,6 +1,7 @@
 """Tracker recordings made from motion clips: people, mounts and tracking errors, all seeded."""
 
-from lobstr_hw.simulation.movement import Habits, Performance, calibrating_movement
+from lobstr_hw.simulation.habits import Habits, Performance
+from lobstr_hw.simulation.movement import calibrating_movement
 from lobstr_hw.simulation.t_pose import PoseDeviation, Sway
 from lobstr_hw.simulation.take import SimulatedTake, drawn_user, simulate, take_samples
 from lobstr_hw.simulation.tracking_errors import TrackingErrors
