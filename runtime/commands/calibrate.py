@@ -9,10 +9,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lobstr_hw.errors import LobstrError, ProfileError
+from lobstr_hw.errors import ProfileError
+from lobstr_hw.runtime.commands.ending import ended
 from lobstr_hw.runtime.commands.numbers import above_zero, between
 from lobstr_hw.runtime.profile_path import default_profile_path
-from lobstr_hw.runtime.stopping import StopRequest
 
 if TYPE_CHECKING:
     from lobstr_hw.drivers.driver import TrackerDriver
@@ -40,19 +40,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.error("--sim is a source of its own; leave --driver out")
     if args.sim is not None and (args.countdown or args.timeout is not None):
         parser.error("--countdown and --timeout are for people; a log waits for nobody")
-    try:
-        with StopRequest() as stop:  # before the slow imports, so that Ctrl-C is clean from here on
-            return _run(args, stop)
-    except LobstrError as error:
-        _tell(str(error))
-        if args.json:
-            print(json.dumps({"error": str(error)}))
-        return 1
-    except KeyboardInterrupt:
-        _tell("stopped; nothing was written.")
-        if args.json:
-            print(json.dumps({"stopped": True}))
-        return 0
+    return ended(
+        lambda stop: _run(args, stop),
+        _tell,
+        as_json=args.json,
+        stopped="stopped; nothing was written.",
+        stopped_code=0,
+        stopped_document={"stopped": True},
+    )
 
 
 def _tell(message: str) -> None:

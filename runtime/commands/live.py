@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lobstr_hw.errors import LobstrError
+from lobstr_hw.runtime.commands.ending import ended
 from lobstr_hw.runtime.commands.numbers import between, zero_or_more
 from lobstr_hw.runtime.outputs.sinks import SINKS, SinkSpec, parse_sink
 from lobstr_hw.runtime.stopping import StopRequest
@@ -39,17 +39,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = _parser()
     args = parser.parse_args(argv)
     _check(parser, args)
-    try:
-        with StopRequest() as stop:  # before the slow imports, so that Ctrl-C is clean from here on
-            return _run(args, stop)
-    except LobstrError as error:
-        _tell(str(error))
-        if args.json:
-            print(json.dumps({"error": str(error)}))
-        return 1
-    except KeyboardInterrupt:
-        _tell("stopped at once.")
-        return 1
+    return ended(
+        lambda stop: _run(args, stop), _tell, as_json=args.json, stopped="stopped at once."
+    )
 
 
 def _tell(message: str) -> None:

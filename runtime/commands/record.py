@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lobstr_hw.errors import LobstrError, OutputError
+from lobstr_hw.errors import OutputError
+from lobstr_hw.runtime.commands.ending import ended
 from lobstr_hw.runtime.commands.numbers import above_zero, between
 from lobstr_hw.runtime.stopping import StopRequest
 
@@ -36,17 +37,8 @@ EXAMPLES = """examples:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code."""
     args = _parser().parse_args(argv)
-    try:
-        with StopRequest() as stop:  # before the slow imports, so that Ctrl-C is clean from here on
-            return _run(args, stop)
-    except LobstrError as error:
-        _tell(str(error))
-        if args.json:
-            print(json.dumps({"error": str(error)}))
-        return 1
-    except KeyboardInterrupt:
-        _tell(f"stopped at once; {args.out} is as it was left. See: lobstr-log info {args.out}")
-        return 1
+    at_once = f"stopped at once; {args.out} is as it was left. See: lobstr-log info {args.out}"
+    return ended(lambda stop: _run(args, stop), _tell, as_json=args.json, stopped=at_once)
 
 
 def _tell(message: str) -> None:
