@@ -153,6 +153,7 @@ def run(bed: RemoteBed, folder: Path, transport: str, times: int, pace: float) -
             cable.wait(lambda sample: is_tracked(sample) and cable.begun_s is not None)
             assert cable.begun_s is not None
             pluggings.append(Plugging(cable.begun_s - plugged_s, cable.device_s))
+            print(f"{transport} {len(pluggings)}: {pluggings[-1]}", file=sys.stderr)
     threads = [t for t in threading.enumerate() if t.name.startswith("lobstr")]
     return Run(transport, pluggings, len(threads), len(os.listdir("/proc/self/fd")) - files)
 

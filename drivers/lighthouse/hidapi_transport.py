@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from threading import Lock
 from typing import Any
 
 from lobstr_hw.drivers.driver import Probe
@@ -20,6 +21,8 @@ from lobstr_hw.errors import DeviceBusy, DriverError, TrackerNotFound
 
 __all__ = ["HidapiTransport"]
 
+ONE_AT_A_TIME = Lock()
+"""Listing, opening and closing share what hidapi keeps for all; reading and asking do not."""
 READ_MS = 50
 REPORT_BYTES = 64
 EXTRA = "lighthouse"
@@ -48,7 +51,9 @@ class HidapiTransport:
             DriverUnavailable: hidapi is missing or does not load.
         """
         hid = require_library(self._module, "hidapi", EXTRA)
-        return _devices([entry for vendor in (VALVE, HTC) for entry in hid.enumerate(vendor, 0)])
+        with ONE_AT_A_TIME:
+            entries = [entry for vendor in (VALVE, HTC) for entry in hid.enumerate(vendor, 0)]
+        return _devices(entries)
 
     def open(self, info: UsbDeviceInfo) -> "HidapiDevice":
         """Claim a device.
@@ -63,7 +68,8 @@ class HidapiTransport:
         try:
             for interface, path in info.interfaces:
                 handles[interface] = hid.device()
-                handles[interface].open_path(path)
+                with ONE_AT_A_TIME:
+                    handles[interface].open_path(path)
         except OSError as error:
             for handle in handles.values():
                 handle.close()
@@ -126,7 +132,7 @@ class HidapiDevice:
         """Let go of the device; see ``OpenDevice``."""
         self._queue.close()
         for handle in self._handles.values():
-            with suppress(OSError):
+            with suppress(OSError), ONE_AT_A_TIME:
                 handle.close()
 
     def _refused(self, what: str, error: Exception | None = None) -> Exception:
