@@ -53,6 +53,7 @@ def main() -> None:
     parser.add_argument("--part", choices=tuple(PARTS), default="test")
     parser.add_argument("--weights", type=Path, default=SHIPPED_TWO_WAY)
     parser.add_argument("--write", type=Path)
+    parser.add_argument("--no-time", action="store_true", help="no log of ten minutes is refined")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     _measure(options)
@@ -109,8 +110,7 @@ def _section(options: argparse.Namespace) -> str:
         _ratios({"all": {row: trees[row]["all"] for row in ROWS}, **sets}) + "\n",
         "By set:\n",
         markdown_table([r for name, pair in sets.items() for r in _rows(pair, f"{name}: ")]) + "\n",
-        "### Time\n",
-        _time(),
+        *([] if options.no_time else ["### Time\n", _time()]),
     ])  # fmt: skip
 
 
@@ -123,7 +123,8 @@ def _recipe(details: dict[str, Any]) -> str:
         f"({details['parameters']:,} parameters), {details['steps_done']:,} steps of "
         f"{config['batch']} chunks of {config['window']} frames, {minutes:.0f} minutes of motion, "
         f"{details['wall_s'] / 60.0:.0f} minutes on one thread of a busy two-core machine. "
-        "Chosen on the validation part; nothing on a test part.\n\n"
+        "Chosen on the validation part; nothing on a test part. "
+        f"{details.get('history', '')}\n\n"
         "Scored by `python tools/two_way_results.py DATA OUT`: trackers from the truth without "
         "noise, the true root, lengths on the 1.0 m skeleton. Both go through the same "
         "contact lock, floor and IK. Refined is what `lobstr-log export --refine` makes: of every "
