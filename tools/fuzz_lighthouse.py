@@ -9,6 +9,7 @@ kept as a file beside where this was run; make a test of it.
 
 import argparse
 import datetime
+import importlib
 import json
 import re
 import struct
@@ -242,19 +243,19 @@ def fuzz(name: str, runs: int, minutes: float) -> Fuzzed:
             stderr=subprocess.PIPE,
             text=True,
             check=False,
+            start_new_session=True,  # Ctrl-C is for this process, which keeps what was found
         )
     end = DONE.search(done.stderr)
     broke = "" if done.returncode == 0 and end else done.stderr[-3000:]
-    counts = [int(x) for x in end.groups()] if end else [0, 0, 0, 0]
-    return Fuzzed(name, *counts, broke)
+    inputs, reached, features, kept = map(int, end.groups()) if end else (0, 0, 0, 0)
+    return Fuzzed(name, inputs, reached, features, kept, broke)
 
 
 def inside(name: str, runs: int, corpus: str, minutes: float) -> None:
     """Never returns."""
     global _NAME
     _NAME = name
-    import atheris
-
+    atheris = importlib.import_module("atheris")  # mypy need not know it
     with atheris.instrument_imports(include=["lobstr_hw.drivers.lighthouse"]):
         TARGETS[name](seeds(name)[0])
     limits = [f"-max_len={LONGEST}", f"-rss_limit_mb={MEMORY_MB}", f"-timeout={SECONDS}"]

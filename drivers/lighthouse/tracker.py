@@ -142,9 +142,10 @@ def _give(
     f, tail = state.filter, state.tail
     if f is None or tail is None or (state.lost and state.place is None):
         return replace(state, given=max(state.given, until)), NO_POSES
-    track = _reckon(state, f, tail, until)
-    if len(track.ticks) < 2:
+    newest = state.imu.ticks[int(np.searchsorted(state.imu.ticks, until, side="right")) - 1]
+    if newest <= tail.ticks:
         return state, NO_POSES
+    track = _reckon(state, f, tail, until)
     end = Tail(int(track.ticks[-1]), track.p[-1], track.v[-1], track.R[-1], tail.covariance)
     new = int(np.searchsorted(track.ticks, state.given, side="right"))
     state = replace(state, tail=end, given=max(state.given, end.ticks))

@@ -125,6 +125,25 @@ def test_reflections_do_not_carry_a_device_away() -> None:
     assert np.max(off_m(poses, motion)[later]) < 0.01
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_shaken_imu_that_loses_samples_does_not_carry_a_device_away(seed: int) -> None:
+    stations, model, motion = room(2), device(), carried(8)
+    imu = imu_of(motion, 1.5, noise=1.0)
+    light = light_of(stations, model, motion, 1.5, noise_rad=1e-4)
+    random = np.random.default_rng(seed)
+    t = (imu.ticks - FIRST) / TICKS_PER_S
+    shaken = ((t > 0.6) & (t < 1.1))[:, None]  # as by a motor: nothing of it moves the device
+    acc = imu.acc_g + shaken * random.normal(scale=0.8, size=imu.acc_g.shape)
+    heard = random.random(len(imu)) > 0.3 * shaken[:, 0]
+    poses = track(
+        model, stations, ImuSamples(imu.ticks[heard], acc[heard], imu.gyro_rad_s[heard]), light
+    )
+    later = times(poses) > 0.3
+    assert not np.any(poses.fix[later] == Fix.LOST)
+    assert np.max(off_m(poses, motion)[later]) < 0.03
+    assert np.max(off_m(poses, motion)[times(poses) > 1.2]) < 0.005
+
+
 def test_covariance_tells_the_size_of_the_error() -> None:
     stations, model, motion = room(2), device(), carried(9)
     imu = imu_of(motion, 2.0, noise=1.0)
