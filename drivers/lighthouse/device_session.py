@@ -34,7 +34,7 @@ __all__ = ["DeviceSession"]
 READ_S = 0.05
 IDLE_S = 0.002
 """A pause after a read that brought nothing, for reads that do not wait themselves."""
-RETRY_S = 1.0
+RETRY_S, BROKEN_S = 1.0, 5.0
 QUICK_TRIES, QUICK_S = 5, 0.02
 """What is being switched on behind a dongle answers within this time; then it is asked seldom."""
 SILENT_READS = 60
@@ -55,7 +55,12 @@ class DeviceSession:
     """
 
     def __init__(
-        self, device: OpenDevice, stations: Stations, gen2: bool, put: Callable[[News], None]
+        self,
+        device: OpenDevice,
+        stations: Stations,
+        gen2: bool,
+        put: Callable[[News], None],
+        told: set[str],
     ) -> None:
         """Start.
 
@@ -64,6 +69,7 @@ class DeviceSession:
             stations: to be tracked by.
             gen2: the light mode to begin with.
             put: takes what happens, from another thread.
+            told: words that were said already; is added to.
         """
         self.device = device
         self.about: About | None = None
@@ -75,7 +81,7 @@ class DeviceSession:
         self._gen2, self._put = gen2, put
         self._stop = Event()
         self._nth = self._refused = 0
-        self._told: set[str] = set()
+        self._told = told
         name = f"lobstr-{device.info.key}"
         self._thread = Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
@@ -93,11 +99,13 @@ class DeviceSession:
         try:
             while not self._stop.is_set():
                 self.about = self._ask()
-                self.settled.set()
                 if self.about is not None:
+                    self.settled.set()
                     self._follow(self.about)
-        except LinkLost:
+        except (LinkLost, OSError):
             pass
+        except Exception as error:  # a fault here must not hide the other devices
+            self._tell(f"{self.device.info.name}: following it failed ({error!r}); report this.")
         finally:
             self._lose()
             self.device.close()
@@ -126,12 +134,14 @@ class DeviceSession:
             version, ranges = ask_version(self.device), ask_ranges(self.device)
         except FileFormatError as error:
             self._tell(f"{self.device.info.name}: {error}; it is left out.")
+            self.settled.set()
+            self._stop.wait(BROKEN_S)
         except NoAnswer as error:
             self._no_answer(error)
+            self._stop.wait(QUICK_S if self._refused <= QUICK_TRIES else RETRY_S)
         else:
             self._refused = 0
             return About(model, version.firmware if version else "", ranges, mode)
-        self._stop.wait(QUICK_S if self._refused <= QUICK_TRIES else RETRY_S)
         return None
 
     def _no_answer(self, error: NoAnswer) -> None:

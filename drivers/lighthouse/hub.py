@@ -74,14 +74,19 @@ class Hub:
         self._stop = Event()
         self._refused: dict[str, DriverError] = {}
         self._desk = StationDesk(stations, self._tell, self._stations_changed)
+        self._told: set[str] = set()
+        self._looking = Thread(target=self._look_again, name="lobstr-plugs", daemon=True)
         self._look()
         if not self._sessions:
             raise next(iter(self._refused.values()), TrackerNotFound(NOT_FOUND))
         for error in self._refused.values():
             self._tell(f"{error}; going on without it.")
-        self._settle()
-        self._looking = Thread(target=self._look_again, name="lobstr-plugs", daemon=True)
-        self._looking.start()
+        try:
+            self._settle()
+            self._looking.start()
+        except BaseException:  # Ctrl-C while devices are asked
+            self.close()
+            raise
 
     def read(self) -> Sequence[Arrival]:
         """What happened; waits a moment for something to happen."""
@@ -125,7 +130,8 @@ class Hub:
     def close(self) -> None:
         """Let go of all devices; never raises."""
         self._stop.set()
-        self._looking.join(timeout=5.0)
+        if self._looking.is_alive():
+            self._looking.join(timeout=5.0)
         for session in self._open():
             session.close()
 
@@ -149,7 +155,7 @@ class Hub:
 
     def _look_again(self) -> None:
         while not self._stop.wait(LOOK_S):
-            with suppress(DriverError):
+            with suppress(DriverError, OSError):
                 for info in self._look():
                     self._tell(f"{self._refused[info.key]}; going on without it.")
 
@@ -182,4 +188,6 @@ class Hub:
         with self._lock:
             stations = self._desk.stations
             gen2 = any(s.calibration.generation == 2 for s in stations.values())
-            self._sessions[info.key] = DeviceSession(device, stations, gen2, self._inbox.put)
+            self._sessions[info.key] = DeviceSession(
+                device, stations, gen2, self._inbox.put, self._told
+            )

@@ -23,8 +23,8 @@ from support.waiting import wait_until
 
 from lobstr_hw.drivers import reading_thread, stream
 from lobstr_hw.drivers.driver import EventKind, TrackerDriver
+from lobstr_hw.drivers.lighthouse import device_session, hub, tracked_device
 from lobstr_hw.drivers.lighthouse import driver as driver_module
-from lobstr_hw.drivers.lighthouse import hub, tracked_device
 from lobstr_hw.drivers.lighthouse.device_follower import About, DeviceFollower
 from lobstr_hw.drivers.lighthouse.driver import LighthouseDriver
 from lobstr_hw.drivers.lighthouse.light_mode import LightMode
@@ -74,7 +74,18 @@ class OneTracker:
         return sum(isinstance(n, Reading) and n.T_world_tracker is not None for n in told)
 
     def make(self) -> TrackerDriver:
-        return LighthouseDriver(self.file, self.transport)
+        """Open, it has found its pose: a search takes long on a busy machine."""
+        driver = LighthouseDriver(self.file, self.transport)
+        claim = driver.open
+
+        def open_and_find() -> None:
+            claim()
+            thread = driver._thread
+            assert thread is not None
+            wait_until(lambda: len(thread._arrivals) >= self.on_opening, "it is found", 60.0)
+
+        setattr(driver, "open", open_and_find)  # noqa: B010
+        return driver
 
     def send(self, frames: int) -> list[Sent]:
         sent: list[Sent] = []
@@ -114,11 +125,16 @@ class Rewinding(HandedOut):
         if count > getattr(self, "_opened", 0):
             self._next = self._allowed = 0
             self.at = self._first
+            self._opened_s = perf_counter()
             self.play(self._first)
         self._opened = count
 
     def _now_s(self) -> float:
-        return perf_counter()
+        """What it sends by itself comes when it is due, not as fast as it can be read."""
+        if self._next > self._first:
+            return perf_counter()
+        due_s = [time_s for time_s, _, _ in self.script.reports[: self._first]]
+        return self._opened_s + due_s[self._next - 1] - due_s[-1]
 
 
 class TestContract(StreamDriverContract):
@@ -126,6 +142,7 @@ class TestContract(StreamDriverContract):
     def bed(self, station_file: Path, monkeypatch: pytest.MonkeyPatch) -> OneTracker:
         monkeypatch.setattr(hub, "LOOK_S", 0.01)
         monkeypatch.setattr(tracked_device, "STEP", 1)  # every sample at once
+        monkeypatch.setattr(stream, "SILENCE_S", 60.0)  # a busy machine is no silence
         return OneTracker(station_file)
 
 
@@ -402,3 +419,41 @@ def test_by_radio_one_mode_after_the_other_is_tried_until_light_makes_sense() ->
 def test_a_device_of_the_first_generation_is_left_in_its_mode() -> None:
     mode = LightMode(gen2=False, has_choice=False, tells=False)
     assert not any(mode.switch(k * S, 0, True) for k in range(100))
+
+
+def test_a_fault_in_following_one_device_is_told_once_and_leaves_the_others(
+    clock: FakeClock, station_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    feed = TrackedDevice.feed
+
+    def faulty(self: TrackedDevice, report: bytes) -> None:
+        if self.model.serial == "LHR-0000000R":
+            raise ZeroDivisionError("made up")
+        feed(self, report)
+
+    monkeypatch.setattr(TrackedDevice, "feed", faulty)
+    bench = Bench(four(0.6)[2:], clock, lambda usb: LighthouseDriver(station_file, usb))
+    with bench.driver:
+        samples = bench.run_to(0.6)
+        words = bench.words()
+    assert {s.serial for s in samples if s.tracked} == {TRACKER.serial}
+    assert sum("ZeroDivisionError" in w for w in words) == 1
+
+
+def test_a_dongle_is_asked_until_something_is_switched_on_behind_it(
+    clock: FakeClock, station_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(device_session, "RETRY_S", 0.01)
+    [script] = one(carried(1), 0.3)
+    script.product = 0x2101
+    bench = Bench([script], clock, lambda usb: LighthouseDriver(station_file, usb))
+    bench.devices[0].answers.stalled.add(0x10)
+    with bench.driver as driver:
+        bench.run_to(0.1)
+        assert [w for w in bench.words() if "nothing is switched on" in w]
+        assert not [d for d in driver.devices() if d.kind == "tracker"]
+        bench.devices[0].answers.stalled.clear()
+        wait_until(lambda: any(d.kind == "tracker" for d in driver.devices()), "it is there")
+    assert bench.devices[0].answers.sent[:1] == [
+        bytes.fromhex("ff9610be5b325411cf8375538a086a5358d0b1")
+    ]
