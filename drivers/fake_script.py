@@ -217,7 +217,7 @@ def _pointing(start_s: float) -> Script:
 
 SCRIPTS: Mapping[str, Script] = {
     "calibrate": _calibrating(),
-    "join": _joining(11.0),
+    "join": _joining(13.0),
     "point": _pointing(4.0),
     "gestures": Script(
         arms=((0.0, 0.0), (4.0, 0.0), (5.0, 1.0)),

@@ -66,12 +66,13 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=120, help="of each kind of mistake")
     parser.add_argument("--seed", type=int, default=8000)
     parser.add_argument("--kept", type=Path, help="outcomes so far: it goes on where it was")
+    parser.add_argument("--no-more", action="store_true", help="only what is in that file")
     parser.add_argument("--write", action="store_true")
     args = parser.parse_args()
     kept = Kept(args.kept)
     # a few of each in turn, so that one that is stopped has something of all
     counts = {name: args.users if name == GOOD else args.cases for name in KINDS}
-    for i in range(max(counts.values())):
+    for i in range(0 if args.no_more else max(counts.values())):
         for k, name in enumerate(KINDS):
             if i < counts[name]:
                 kept.outcome(name, args.seed + SEEDS_APART * k + i)
@@ -290,6 +291,7 @@ def _head(args: argparse.Namespace) -> str:
     command = (
         f"python tools/wizard_table.py --users {args.users} --cases {args.cases} --seed {args.seed}"
     )
+    stopped = " (stopped before its end: the rows say how many it had)" if args.no_more else ""
     date = datetime.datetime.now(tz=datetime.UTC).date()
     return f"""{TITLE}
 
@@ -300,7 +302,7 @@ anything, so every part of the movement takes its whole time, and what was missi
 not done again. Samples at 45 Hz with Lighthouse errors. Who does something wrong goes on doing it
 for 12 s; "never past" a step means that it was not accepted in that time.
 
-`{command}`, {date}.
+`{command}`, {date}{stopped}.
 """
 
 
