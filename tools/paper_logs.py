@@ -5,7 +5,7 @@ at random places, Lighthouse errors and a sloppy T-pose, and is calibrated from 
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -163,16 +163,16 @@ def _truth(take: SimulatedTake) -> Truth:
     )
 
 
-def scored(row: Trained, worn: Sequence[Worn], kept: Path) -> Scored:
+def scored(row: Trained, worn: Callable[[], Sequence[Worn]], kept: Path) -> Scored:
     """One row over the recordings of a stature; kept in a file, read from there if still true."""
     if kept.is_file():
         document = json.loads(kept.read_text(encoding="utf-8"))
-        if document["steps"] == row.run.step and document["recordings"] == len(worn):
+        if document["steps"] == row.run.step:
             return Scored(**document["scored"])
     frames: dict[str, int] = {}
     apart: dict[str, float] = {}
     updates: list[Array] = []
-    for take in worn:
+    for take in worn():
         error, joints = _said(row, take)
         for activity in np.unique(take.activity[take.since :]):
             at = take.activity[take.since :] == activity
@@ -181,7 +181,7 @@ def scored(row: Trained, worn: Sequence[Worn], kept: Path) -> Scored:
         updates.append(np.stack([_updates(joints), _updates(take.joints[take.since :])], axis=1))
     said, true = np.concatenate(updates).mean(axis=0)
     result = Scored(frames, apart, float(said), float(true))
-    document = {"steps": row.run.step, "recordings": len(worn), "scored": vars(result)}
+    document = {"steps": row.run.step, "scored": vars(result)}
     kept.parent.mkdir(parents=True, exist_ok=True)
     kept.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return result

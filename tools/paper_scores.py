@@ -49,14 +49,16 @@ def clips_of(data: Path, part: str) -> list[Truth]:
     return [Truth.of(motion) for motion in retarget(found) if clip_name(motion.name) in wanted]
 
 
-def scores(row: Trained, clips: Sequence[Truth], every_s: float, kept: Path) -> Scores:
+def scores(
+    row: Trained, clips: Callable[[], Sequence[Truth]], every_s: float, kept: Path
+) -> Scores:
     """Of one second in every so many; kept in a file, and read from there if still true."""
-    said = {"steps": row.run.step, "every_s": every_s, "clips": len(clips)}
+    said = {"steps": row.run.step, "every_s": every_s}
     if kept.is_file():
         document = json.loads(kept.read_text(encoding="utf-8"))
         if {name: document[name] for name in said} == said:
             return dict(document["scores"])
-    total = sum((_clip_tally(row, clip, every_s) for clip in clips), Tally())
+    total = sum((_clip_tally(row, clip, every_s) for clip in clips()), Tally())
     kept.parent.mkdir(parents=True, exist_ok=True)
     document = {**said, "scores": total.scores()}
     kept.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")

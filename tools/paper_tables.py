@@ -15,11 +15,11 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import torch
-from paper_logs import CLIPS, LONGEST_S, STATURES_CM, Scored, motions, recordings, scored
+from paper_logs import CLIPS, LONGEST_S, STATURES_CM, Scored, Worn, motions, recordings, scored
 from paper_rows import SETTINGS, TABLES, WHOLE, Trained, train_missing, trained
 from paper_scores import clips_of, cost_of, scores
 from results_page import write_section
@@ -27,6 +27,7 @@ from results_page import write_section
 from lobstr_hw.evaluation.activities import Activity
 from lobstr_hw.evaluation.metrics import Scores
 from lobstr_hw.evaluation.truth import Truth
+from lobstr_hw.motion import Motion
 from lobstr_hw.training.network import parameter_count
 
 PARTS = {"test": "People nobody trained on", "test_same_actor": "Other clips of known people"}
@@ -68,14 +69,31 @@ class Sources:
     def scores(self, row: str, network: Trained, part: str) -> Scores:
         """Of a row on a part."""
         kept = self.out / "scores" / f"{row}-{part}.json"
-        _say(f"{row} on {part}")
-        return scores(network, _clips(self.data, part), self.every_s, kept)
+        return scores(network, partial(_clips, self.data, part), self.every_s, kept)
+
+    def scored(self, row: str, network: Trained, stature_cm: int) -> Scored:
+        """Of a row on the recordings of a stature."""
+        kept = self.out / "scores" / f"{row}-{stature_cm}cm-{self.logs_seed}.json"
+        worn = partial(_recordings, self.data, stature_cm, self.logs_seed)
+        return scored(network, worn, kept)
 
 
 @cache
 def _clips(data: Path, part: str) -> list[Truth]:
     _say(f"reading {part}")
     return clips_of(data, part)
+
+
+@cache
+def _motions(data: Path) -> list[Motion]:
+    _say("reading the clips of the recordings")
+    return motions(data)
+
+
+@cache
+def _recordings(data: Path, stature_cm: int, seed: int) -> list[Worn]:
+    _say(f"recordings of {stature_cm} cm")
+    return recordings(_motions(data), stature_cm, seed)
 
 
 def main() -> int:
@@ -182,21 +200,18 @@ def _cost_table(rows: dict[str, Trained]) -> str:
 
 def _log_tables(sources: Sources, rows: dict[str, Trained]) -> list[str]:
     """Toe-base distance errors by activity, and body movement, of made recordings."""
-    clips = motions(sources.data)
-    found: dict[tuple[int, str], Scored] = {}
-    for stature in STATURES_CM:
-        worn = recordings(clips, stature, sources.logs_seed)
-        for row, network in rows.items():
-            _say(f"{row} at {stature} cm")
-            kept = sources.out / "scores" / f"{row}-{stature}cm-{sources.logs_seed}.json"
-            found[stature, row] = scored(network, worn, kept)
+    found = {
+        (stature, row): sources.scored(row, network, stature)
+        for stature in STATURES_CM
+        for row, network in rows.items()
+    }
     seen = [str(a) for a in Activity if any(str(a) in s.frames for s in found.values())]
     seconds = sum(next(iter(found.values())).frames.values()) / 45.0
     return [
         "### Made recordings of three statures",
         "",
-        f"The first {LONGEST_S:g} s of {len(CLIPS)} clips that nobody trained on, {seconds:.0f} s "
-        "scored a stature, each done by somebody of that stature with proportions of their own "
+        f"The first {LONGEST_S:g} s of each piece of {len(CLIPS)} clips that nobody trained on, "
+        f"{seconds:.0f} s scored a stature, done by people of that stature with their own proportions "
         f"(seed {sources.logs_seed}), trackers on at random places, Lighthouse errors, calibrated "
         "by a sloppy T-pose. Error of the distance between the toe bases in the user's "
         "centimetres, by what is done in the frame (`lobstr_hw/evaluation/activities.py`); "
