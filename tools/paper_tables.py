@@ -212,8 +212,8 @@ def _log_tables(sources: Sources, rows: dict[str, Trained]) -> list[str]:
         "",
         f"The first {LONGEST_S:g} s of each piece of {len(CLIPS)} clips that nobody trained on, "
         f"{seconds:.0f} s scored a stature, done by people of that stature with their own "
-        f"proportions (seed {sources.logs_seed}), trackers on at random places, Lighthouse errors, calibrated "
-        "by a sloppy T-pose. Error of the distance between the toe bases in the user's "
+        f"proportions (seed {sources.logs_seed}), trackers on at random places, Lighthouse errors, "
+        "calibrated by a sloppy T-pose. Error of the distance between the toe bases in the user's "
         "centimetres, by what is done in the frame (`lobstr_hw/evaluation/activities.py`); "
         "activities of less than two seconds in brackets.",
         "",
