@@ -14,14 +14,17 @@ __all__ = ["LONGEST_GAP_S", "Track", "usable"]
 LONGEST_GAP_S = 0.1
 """Where nothing was seen for longer, nothing is known of what was in between."""
 
+FARTHEST_M = 1000.0
+"""From the origin; a device that says more is broken, and its squares overflow."""
+
 
 def usable(sample: TrackerSample) -> bool:
-    """Whether the device saw itself and all its numbers are finite."""
+    """Whether the device saw itself, its numbers are finite, and it is in anybody's room."""
     pose = sample.T_world_tracker
     return bool(
         sample.tracked
         and pose.p is not None
-        and np.isfinite(pose.p).all()
+        and (np.abs(pose.p) < FARTHEST_M).all()  # false for what is no number, too
         and np.isfinite(pose.R).all()
     )
 
