@@ -1,7 +1,10 @@
 """Options and shared fixtures of all tests."""
 
 import pytest
+from hypothesis import settings
 
+settings.register_profile("untimed", deadline=None)  # a busy machine is not a failed law
+settings.load_profile("untimed")
 pytest.register_assert_rewrite("support.driver_contract")  # its asserts explain themselves too
 
 
