@@ -16,11 +16,11 @@ from lobstr_hw.runtime.commands.bench_lighthouse import HEAD, measure, measure_l
 
 HEADING = "## Lighthouse: speed"
 TEXT = """\
-CPU time of one process on two shared cores with ten times as much other work as they can do, so
-upper bounds; the yardstick is 20,000 products of 3x3 matrices in numpy, timed in between. Decoded:
-file to angles. Tracked: file to poses, decoding included, in batches of 12 ms as live. Asked: three
-devices with two stations in real time on at most 40 % of one core; libsurvive (in C) does 15,000 to
-44,000 events per second tracked, 80,000 to 116,000 decoded."""
+CPU time of one process on two shared cores; the yardstick is 20,000 products of 3x3 matrices in
+numpy, timed in between (on a busy machine all takes up to twice as long). Decoded: file to angles.
+Tracked: file to poses, decoding included, in batches of 12 ms as live. Asked: three devices with
+two stations in real time on at most 40 % of one core; libsurvive (in C) does 15,000 to 44,000
+events per second tracked, 80,000 to 116,000 decoded."""
 
 
 def main() -> None:
