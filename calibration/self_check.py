@@ -8,13 +8,18 @@ from lobstr_hw.calibration.movement import Refinement
 from lobstr_hw.calibration.recording import Movement
 from lobstr_hw.calibration.slips import steps_of
 from lobstr_hw.calibration.t_pose import Check, TPose
-from lobstr_hw.trackers import FOUR_POINTS
+from lobstr_hw.trackers import FOUR_POINTS, TrackerRole
 
 __all__ = ["SelfCheck", "check_calibration"]
 
+_HEAD, _PELVIS = FOUR_POINTS.index(TrackerRole.HEAD), FOUR_POINTS.index(TrackerRole.PELVIS)
 BEFORE_S, AFTER_S = 0.7, 0.9
 """Around the T-pose's window, looked at for trackers that slip; the pose is held that long."""
 _FROZEN_M = 2e-6
+_UP_SHARE = 0.1
+_HIGHER_M = 0.1
+"""Simulated people who stood are at most 3 cm higher later, toes lift some 8 at times; who gets up
+from a seat of two thirds of their hips' height is 25 cm higher or more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +59,7 @@ def check_calibration(pose: TPose, recording: Movement, refinement: Refinement) 
             *pose.quality.checks,
             *_slips(recording.between(pose.start_s - BEFORE_S, pose.end_s + AFTER_S)),
             *_sight(recording),
+            _stood(pose, recording.between(pose.end_s)),
             *_person(refinement),
         )
     )
@@ -90,6 +96,22 @@ def _sight(recording: Movement) -> list[Check]:
         alive = "its poses do not change at all: switch it off and on again"
         found.append(Check(f"{role} alive", min(moved, 9.0), _FROZEN_M, 9.0, "m", alive))
     return found
+
+
+def _stood(pose: TPose, movement: Movement) -> Check:
+    """Nobody grows: who is higher for a tenth of the movement did not stand in the pose."""
+    higher = np.zeros(1)
+    if len(movement):
+        rise = movement.p[:, [_HEAD, _PELVIS], 1] - pose.p[[_HEAD, _PELVIS], 1]
+        higher = np.maximum(np.min(rise, axis=-1), 0.0)
+    return Check(
+        "height gained",
+        100.0 * float(np.quantile(higher, 1.0 - _UP_SHARE)),
+        0.0,
+        100.0 * _HIGHER_M,
+        "cm",
+        "you were higher in the movement than in the T-pose: stand up straight, and do both again",
+    )
 
 
 def _person(refinement: Refinement) -> list[Check]:

@@ -77,6 +77,32 @@ def test_who_sits_is_told_to_stand(seed: int) -> None:
     assert "stand" in reason or "arms" in reason
 
 
+@pytest.mark.parametrize(
+    ("risen", "higher_m", "share", "noticed"),
+    [
+        ((0, 1, 2, 3), 0.2, 1.0, True),
+        ((0, 1, 2, 3), 0.2, 0.3, True),
+        ((0, 1, 2, 3), 0.2, 0.05, False),
+        ((0, 1, 2, 3), 0.06, 1.0, False),
+        ((0, 1, 2, 3), -0.3, 1.0, False),
+        ((0,), 0.2, 1.0, False),
+        ((1, 2, 3), 0.2, 1.0, False),
+    ],
+)
+def test_who_gets_up_for_the_movement_did_not_stand_in_the_pose(
+    risen: tuple[int, ...], higher_m: float, share: float, noticed: bool
+) -> None:
+    pose, recording = pose_and_recording(somebodys_take(2))
+    refinement = refine_by_movement(pose, recording.between(pose.end_s))
+    p, after = np.array(recording.p), int(np.searchsorted(recording.times_s, pose.end_s))
+    part = slice(after, after + round(share * (len(p) - after)))
+    p[part, list(risen), 1] = pose.p[list(risen), 1] + higher_m
+    check = check_calibration(pose, replace(recording, p=p), refinement)
+    gained = [failed for failed in check.failed if failed.name == "height gained"]
+    assert bool(gained) == noticed
+    assert all("stand up straight" in failed.advice for failed in gained)
+
+
 @pytest.mark.parametrize("up_deg", [(-35.0, 0.0), (0.0, 32.0), (40.0, 40.0), (-45.0, -30.0)])
 def test_arms_off_level_are_not_taken(up_deg: tuple[float, float]) -> None:
     rng = np.random.default_rng(5)
