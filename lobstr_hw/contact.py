@@ -43,7 +43,7 @@ class LockSettings:
     floor_within_m: float = 0.03
     floor_s: float = 0.1
     release_s: float = 0.06
-    smooth_s: float = 0.05
+    smooth_s: float = 0.035
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -89,7 +89,7 @@ def main() -> int:
     parts = [
         _statures(predictor, short, args.seed),
         _mounts(predictor, short, args.seed),
-        _rates(args.predictor, short[:: max(len(short) // 6, 1)], args.seed),
+        _rates(args.predictor, short[:: max(len(short) // 4, 1)], args.seed),
         _recovery(predictor, short, args.seed),
         _drift(predictor, motions, args.seed),
     ]

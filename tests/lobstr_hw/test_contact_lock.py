@@ -179,18 +179,25 @@ def test_a_step_of_the_leg_is_not_delayed_and_its_trembling_is_taken_away() -> N
     noise = [0.01 * rng.normal(size=(1, 2, 3)) for _ in range(100)]
     still = np.array([shown_leg(walk, dt, k) for k in (20, 60, 99)])
     np.testing.assert_allclose(still, [walk[20], walk[60], walk[99]], atol=1e-3)
-    shown = np.array([shown_leg([w + n for w, n in zip(walk, noise, strict=True)], dt)])
-    trembling = np.diff(shown[0] - walk, n=3, axis=0).std()
-    assert trembling < 0.5 * np.diff(noise, n=3, axis=0).std()
+    given = [w + n for w, n in zip(walk, noise, strict=True)]
+    trembling = [
+        np.diff(shown_leg(given, dt, settings=replace(SETTINGS, smooth_s=memory_s)) - walk, 3, 0)
+        for memory_s in (0.025, 0.05, 0.1)
+    ]
+    share = [t.std() / np.diff(noise, n=3, axis=0).std() for t in trembling]
+    assert share[2] < share[1] < share[0] < 1.0
+    assert share[1] < 0.5
 
 
-def shown_leg(walk: list[Array], dt_s: float, at: int | None = None) -> Array:
+def shown_leg(
+    walk: list[Array], dt_s: float, at: int | None = None, settings: LockSettings = SETTINGS
+) -> Array:
     """The smoothed toes of a leg that moves under hips at rest: at one tick, or at all."""
     lock, out = ContactLock.start(1), []
     for toe in walk:
-        lock, shown = smoothed(lock, toe, HIP, np.array([[dt_s]]), SETTINGS)
+        lock, shown = smoothed(lock, toe, HIP, np.array([[dt_s]]), settings)
         lock = follow(
-            lock, shown, shown, NOBODY, np.zeros((1, 2)), ~NOBODY, np.array([[dt_s]]), SETTINGS
+            lock, shown, shown, NOBODY, np.zeros((1, 2)), ~NOBODY, np.array([[dt_s]]), settings
         )
         out.append(shown)
     return np.array(out) if at is None else out[at]
