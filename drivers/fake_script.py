@@ -202,7 +202,7 @@ def _calibrating(start_s: float = 0.0) -> Script:
 
 
 def _joining(start_s: float) -> Script:
-    """The same, after the pelvis tracker was held against the left controller for ten seconds."""
+    """The same, after the pelvis tracker was held against the left controller for a while."""
     script, held = _calibrating(start_s), (0.0, start_s - 1.0)
     swirl = Move("swirl", *held, lambda x: x)
     return replace(script, moves=(swirl, *script.moves), in_hand=held)
@@ -217,7 +217,7 @@ def _pointing(start_s: float) -> Script:
 
 SCRIPTS: Mapping[str, Script] = {
     "calibrate": _calibrating(),
-    "join": _joining(13.0),
+    "join": _joining(16.0),
     "point": _pointing(4.0),
     "gestures": Script(
         arms=((0.0, 0.0), (4.0, 0.0), (5.0, 1.0)),

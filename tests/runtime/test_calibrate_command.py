@@ -224,7 +224,7 @@ def mixed_log(path: Path, script: str, seconds: float, profile: str = "") -> Pat
 def test_a_log_of_two_systems_is_joined_by_the_movement_in_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path, log = tmp_path / "me.json", mixed_log(tmp_path / "mixed.mcap", "join", 33.0)
+    path, log = tmp_path / "me.json", mixed_log(tmp_path / "mixed.mcap", "join", 36.0)
     assert main(["--sim", str(log), "--yes", "--profile", str(path)]) == 0
     assert "Tracking spaces" in capsys.readouterr().out
     first = load_profile(path)

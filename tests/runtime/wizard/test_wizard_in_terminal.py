@@ -125,7 +125,7 @@ def test_two_tracking_systems_become_one_body(tmp_path: Path) -> None:
     command = [CALIBRATE, *systems("join"), "--no-speech", "--profile", str(path)]
     with in_terminal(command) as terminal:
         terminal.wait_for("Hold the belt tracker and one of fake firmly together")
-        assert terminal.finish(60.0) == 0, terminal.text
+        assert terminal.finish(90.0) == 0, terminal.text
     shows_in_order(terminal, "1/5 Join", "as one", "Joined to within", "good", "2/5 Devices")
     shows_in_order(terminal, "Calibration is good", "Tracking spaces", "the world", "mm")
     found = load_profile(path).tracking_spaces["belt"].T_world_space @ OTHER_SPACE
