@@ -89,11 +89,11 @@ class Actor:
         What was before such a time is the same whatever comes after: so the play goes on where it
         was.
         """
-        parts = [_first(self.standing, arms_up_s)]
+        parts = [first(self.standing, arms_up_s)]
         reached_s = np.inf
         if arms_up_s is not None:
             reached_s = arms_up_s + STEP_S
-            parts.append(_first(self.t_pose, None if moves_s is None else moves_s - reached_s))
+            parts.append(first(self.t_pose, None if moves_s is None else moves_s - reached_s))
         if moves_s is not None:
             parts += [self.movement, self.standing]
         whole = parts[0] if len(parts) == 1 else joined(parts, STEP_S)
@@ -103,7 +103,7 @@ class Actor:
         return self.mishap(take, reached_s)
 
 
-def _first(motion: Motion, seconds: float | None) -> Motion:
+def first(motion: Motion, seconds: float | None) -> Motion:
     """The first seconds of a motion."""
     if seconds is None:
         return motion

@@ -11,28 +11,24 @@ import datetime
 import json
 import re
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from itertools import permutations
 from pathlib import Path
 
 import numpy as np
 from movement_table import ROWS
 from results_page import write_section
 from self_check_table import wilson
-from wizard_actor import LONG_S, STEP_S, Actor, Play, Played
+from wizard_actor import STEP_S, Actor, Play, Played
+from wizard_mistakes import GOOD, KINDS
 
 from lobstr_hw.calibration import Calibration, movement_from_samples, refine_by_movement
 from lobstr_hw.calibration.profile import profile_to_json
 from lobstr_hw.rotations import geodesic_angle, rotation_mean
-from lobstr_hw.simulation import PoseDeviation, SimulatedTake
-from lobstr_hw.simulation.mishaps import any_direction, arms_off_level, seated, slipped, unseen
-from lobstr_hw.trackers import FOUR_POINTS
+from lobstr_hw.simulation import SimulatedTake
 
 TITLE = "## The wizard from end to end"
-SLIP_S = (0.3, 1.7)  # after the arms are up; the pose is taken from about 0.2 to 1.7 s
 SETTLED = (0.01, np.deg2rad(3.0))
-GOOD, DONE = "good", "done"
+DONE = "done"
 SEEDS_APART = 1000
 LOOK_EVERY = 5
 """Every fifth profile is made once more by the pure functions."""
@@ -160,79 +156,6 @@ def _same(p: Played) -> bool:
     recording = movement_from_samples(p.samples, pose.serials, begin_s)
     again = refine_by_movement(pose, recording.between(pose.end_s)).calibration
     return profile_to_json(again) == profile_to_json(found)
-
-
-# what people do wrong
-
-
-def _rng(seed: int) -> np.random.Generator:
-    return np.random.default_rng([seed, 11])
-
-
-def exchanged(seed: int) -> Actor:
-    """Devices that say they are something else: any wrong order of the four roles."""
-    wrong = list(permutations(FOUR_POINTS))[1:]
-    return replace(Actor.drawn(seed), order=wrong[int(_rng(seed).integers(len(wrong)))])
-
-
-def sitting(seed: int) -> Actor:
-    """All the time, on a chair or stool."""
-    actor, hips = Actor.drawn(seed), _rng(seed).uniform(0.50, 0.68)
-    return replace(actor, standing=seated(actor.standing, hips), t_pose=seated(actor.t_pose, hips))
-
-
-def arms(seed: int) -> Actor:
-    """One arm or both, up or down, 30 to 60 degrees from level."""
-    rng = _rng(seed)
-    up = np.deg2rad(rng.uniform(30.0, 60.0, 2)) * rng.choice([-1.0, 1.0], 2)
-    which = int(rng.integers(3))
-    left, right = (up[0] if which != 1 else 0.0), (up[1] if which != 0 else 0.0)
-
-    def change(own: PoseDeviation) -> PoseDeviation:
-        straight = np.where([[left != 0.0], [right != 0.0]], 0.0, own.arms)
-        return arms_off_level(replace(own, arms=straight), (left, right))
-
-    return Actor.drawn(seed, change)
-
-
-def slip(seed: int, shift_m: float, turn_rad: float) -> Actor:
-    """A tracker moves on its joint while the T-pose is held."""
-    rng = _rng(seed)
-    tracker, after_s, lasts_s = int(rng.integers(4)), rng.uniform(*SLIP_S), rng.uniform(0.05, 0.3)
-    shift, turn = any_direction(rng, shift_m), any_direction(rng, turn_rad)
-
-    def at(take: SimulatedTake, when_s: float) -> SimulatedTake:
-        return slipped(take, tracker, when_s, shift=shift, turn=turn, lasts_s=lasts_s)
-
-    def mishap(take: SimulatedTake, reached_s: float) -> SimulatedTake:
-        return take if reached_s == np.inf else at(take, reached_s + after_s)
-
-    return replace(Actor.drawn(seed), mishap=mishap, settled=lambda take, _: at(take, -LONG_S))
-
-
-def unseen_tracker(seed: int) -> Actor:
-    """From the beginning, or from when the arms are up."""
-    tracker = int(_rng(seed).integers(4))
-
-    def mishap(take: SimulatedTake, reached_s: float) -> SimulatedTake:
-        if seed % 2:
-            return unseen(take, tracker)
-        tracked = np.array(take.tracked)
-        tracked[take.times_s >= reached_s, tracker] = False
-        return replace(take, tracked=tracked)
-
-    return replace(Actor.drawn(seed), mishap=mishap)
-
-
-KINDS: dict[str, Callable[[int], Actor]] = {
-    GOOD: Actor.drawn,
-    "roles exchanged": exchanged,
-    "sitting": sitting,
-    "arms 30 to 60 degrees from level": arms,
-    "a tracker moved by 3 cm in the pose": lambda seed: slip(seed, 0.03, 0.0),
-    "a tracker turned by 10 degrees in the pose": lambda seed: slip(seed, 0.0, np.deg2rad(10.0)),
-    "one tracker not tracked": unseen_tracker,
-}
 
 
 def _wrong(kept: Kept) -> list[str]:
