@@ -202,8 +202,8 @@ Why some differ, and what only we have:
 - Outside, all of them before: the reference waits for a device's configuration and, in Gen1, longer
   until it is sure of the stations' rhythm.
 - The first light: until its first IMU sample the reference lacks the upper 8 of 32 bits of light
-  times and goes on without, or with those of before; we leave such light out by 24 bits, and have
-  the right bits soonest.
+  times and goes on without, or with those of before; our light waits until the samples run (50 ms),
+  and is left out by 24 bits where reports of before were left over in the device.
 - Gen1 angles, within: pulses of 50 to 100 ticks at the edge of the light, of which the reference
   leaves out a few.
 - Gen1 angles that are off (one wand): its flashes were seen by other sensors than before, up to

@@ -39,7 +39,8 @@ from lobstr_hw.trackers import TrackerSample, TrackingState
 
 HEADING = "## Lighthouse devices unplugged and plugged in again"
 INSIDE = "inside"
-SCRIPT, STATIONS, RUNS = "script.json", "stations.json", "runs.json"
+SCRIPT, STATIONS, RUN = "script.json", "stations.json", "run.json"
+CRASHED = "the program crashed"
 SERIAL = "LHR-00000001"
 STEP_S = 0.005
 LENGTH_S = 8.0
@@ -74,12 +75,16 @@ class Run:
         pluggings: each time.
         threads: left when the driver was closed.
         files: more than before it was opened.
+        ended: what broke it off, or empty.
+        load: of the machine, over the last minute.
     """
 
     transport: str
     pluggings: list[Plugging]
     threads: int
     files: int
+    ended: str
+    load: float
 
 
 class Cable:
@@ -114,7 +119,7 @@ class Cable:
                 if done(sample):
                     return sample
             time.sleep(STEP_S)
-        raise SystemExit(f"no such sample within {PATIENCE_S} s")
+        raise TimeoutError(f"no such sample within {PATIENCE_S:g} s")
 
     def _send(self) -> None:
         """What the device says by now; it begins when it is told to."""
@@ -145,45 +150,56 @@ def run(bed: RemoteBed, folder: Path, transport: str, times: int, pace: float) -
     with LighthouseDriver(folder / STATIONS, transport) as driver:
         cable = Cable(bed, script, driver, pace)
         cable.wait(is_tracked)
-        for _ in range(times):
-            cable.unplug()
-            cable.wait(is_gone)
-            cable.plug()
-            plugged_s = time.perf_counter()
-            cable.wait(lambda sample: is_tracked(sample) and cable.begun_s is not None)
-            assert cable.begun_s is not None
-            pluggings.append(Plugging(cable.begun_s - plugged_s, cable.device_s))
-            print(f"{transport} {len(pluggings)}: {pluggings[-1]}", file=sys.stderr)
+        ended = ""
+        try:
+            for _ in range(times):
+                pluggings.append(replug(cable))
+                save(folder, Run(transport, pluggings, 0, 0, CRASHED, os.getloadavg()[0]))
+                print(f"{transport} {len(pluggings)}: {pluggings[-1]}", file=sys.stderr)
+        except TimeoutError as error:
+            ended = str(error)
     threads = [t for t in threading.enumerate() if t.name.startswith("lobstr")]
-    return Run(transport, pluggings, len(threads), len(os.listdir("/proc/self/fd")) - files)
+    more = len(os.listdir("/proc/self/fd")) - files
+    return Run(transport, pluggings, len(threads), more, ended, os.getloadavg()[0])
 
 
-def inside(folder: Path, times: int, pace: float, transports: Sequence[str]) -> None:
-    """Within the bed: all transports, one after the other."""
+def replug(cable: Cable) -> Plugging:
+    """Once."""
+    cable.unplug()
+    cable.wait(is_gone)
+    cable.plug()
+    plugged_s = time.perf_counter()
+    cable.wait(lambda sample: is_tracked(sample) and cable.begun_s is not None)
+    assert cable.begun_s is not None
+    return Plugging(cable.begun_s - plugged_s, cable.device_s)
+
+
+def save(folder: Path, done: Run) -> None:
+    (folder / RUN).write_text(json.dumps(asdict(done)), encoding="utf-8")
+
+
+def inside(folder: Path, times: int, pace: float, transport: str) -> None:
+    """Within the bed."""
     use_system_libusb()
     bed = RemoteBed()
-    runs = []
-    for name in transports:
-        bed.unplug()
-        bed.plug()
-        runs.append(asdict(run(bed, folder, name, times, pace)))
+    save(folder, run(bed, folder, transport, times, pace))
     bed.close()
-    (folder / RUNS).write_text(json.dumps(runs), encoding="utf-8")
 
 
-def measure(times: int, seed: int, pace: float, transports: Sequence[str]) -> list[Run]:
-    """Run the bed."""
+def measure(times: int, seed: int, pace: float, transport: str) -> Run:
+    """Run the bed, for one transport: what a crash leaves undone touches no other."""
     stations, model = room(2, seed), named(SERIAL)
     reports = reports_of(stations, model, carried(seed), LENGTH_S, seed=seed)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         save_script([scripted_device(model, reports)], folder / SCRIPT)
         save_stations(folder / STATIONS, stations, {})
+        save(folder, Run(transport, [], 0, 0, CRASHED, 0.0))
         bed = [str(SYSTEM_PYTHON), str(SUPPORT / "lighthouse_testbed.py"), str(folder / SCRIPT)]
-        command = [sys.executable, __file__, INSIDE, name, str(times), str(pace), *transports]
-        subprocess.run([*bed, *command], check=True)
-        runs = json.loads((folder / RUNS).read_text(encoding="utf-8"))
-    return [Run(**{**r, "pluggings": [Plugging(**p) for p in r["pluggings"]]}) for r in runs]
+        command = [sys.executable, __file__, INSIDE, name, str(times), str(pace), transport]
+        subprocess.run([*bed, *command])
+        r = json.loads((folder / RUN).read_text(encoding="utf-8"))
+    return Run(**{**r, "pluggings": [Plugging(**p) for p in r["pluggings"]]})
 
 
 TEXT = """{heading}
@@ -193,10 +209,11 @@ A made-up tracker by cable in a made-up room with two Gen2 stations whose place 
 real libraries (umockdev). Found: until the driver, which looks once a second, has opened it, read
 its configuration and told it to begin. Tracked: from its first report to the first tracked sample,
 in its own time, which passed at {pace:g} of the wall's. The goal is {goal:g} s for both together.
-Left: threads and open files after the driver was closed, more than before it was opened.
+Left: threads and open files after the driver was closed, more than before it was opened. Load:
+of the machine's {cores} cores at the end, by this and by other work.
 
-| transport | times | found, median (s) | tracked | both | both, most | within {goal:g} s | left |
-|---|---|---|---|---|---|---|---|
+| transport | times | found (s, median) | tracked | both | most | within {goal:g} s | left | load |
+|---|---|---|---|---|---|---|---|---|
 {rows}
 """
 
@@ -210,11 +227,14 @@ def table(runs: Sequence[Run], args: argparse.Namespace) -> str:
         pace=args.pace,
         date=datetime.date.today(),
         goal=GOAL_S,
+        cores=os.cpu_count(),
         rows="\n".join(_line(run) for run in runs),
     )
 
 
 def _line(run: Run) -> str:
+    if not run.pluggings:
+        return f"| {run.transport} | 0 | | | | | | {run.ended} | {run.load:.0f} |"
     found, device, both = (
         np.array([getattr(p, name) for p in run.pluggings])
         for name in ("found_s", "device_s", "seconds")
@@ -222,14 +242,14 @@ def _line(run: Run) -> str:
     cells = [
         run.transport, f"{len(both)}", f"{np.median(found):.2f}", f"{np.median(device):.2f}",
         f"{np.median(both):.2f}", f"{both.max():.2f}", f"{np.mean(both <= GOAL_S):.0%}",
-        f"{run.threads} threads, {run.files} files",
+        run.ended or f"{run.threads} threads, {run.files} files", f"{run.load:.0f}",
     ]  # fmt: skip
     return "| " + " | ".join(cells) + " |"
 
 
 def main() -> None:
     if sys.argv[1:2] == [INSIDE]:
-        inside(Path(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]), sys.argv[5:])
+        inside(Path(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]), sys.argv[5])
         return
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -241,10 +261,12 @@ def main() -> None:
     parser.add_argument("--write", type=Path)
     args = parser.parse_args()
     transports = args.transport or [t.name for t in TRANSPORTS]
-    text = table(measure(args.times, args.seed, args.pace, transports), args)
-    print(text)
-    if args.write:
-        write_section(text, args.write)
+    runs = []
+    for name in transports:
+        runs.append(measure(args.times, args.seed, args.pace, name))
+        print(_line(runs[-1]), flush=True)
+        if args.write:
+            write_section(table(runs, args), args.write)
 
 
 if __name__ == "__main__":

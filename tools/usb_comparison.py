@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Ints
 from lobstr_hw.drivers.lighthouse.captured_device import CapturedDevice
 from lobstr_hw.drivers.lighthouse.decoding import DeviceDecoder
 from lobstr_hw.drivers.lighthouse.light import Stations, join_angles
@@ -17,9 +16,6 @@ from lobstr_hw.drivers.lighthouse.usb_report import ReportKind, UsbReport
 from lobstr_hw.drivers.lighthouse.usbmon import read_usbmon
 from lobstr_hw.errors import FileFormatError, StationsNotSolved
 from lobstr_hw.rotations import Array
-
-SETTLED_TICKS = TICKS_PER_S
-"""Light before the first IMU sample has no time: there the order decides what is heard at all."""
 
 
 def takes_and_stations(path: Path, solve: bool) -> tuple[list[RecordedTake], Stations]:
@@ -70,17 +66,13 @@ def track(take: RecordedTake, reports: Iterator[UsbReport], stations: Stations) 
     return tracked.poses()
 
 
-def far_apart(a: TimedPoses, b: TimedPoses) -> float:
-    """The largest difference of two tracks, once settled; infinite if not of the same moments."""
-    i, j = _settled(a.ticks), _settled(b.ticks)
-    if not np.array_equal(a.ticks[i], b.ticks[j]) or not np.array_equal(a.tracked[i], b.tracked[j]):
-        return float("inf")
+def far_apart(a: TimedPoses, b: TimedPoses) -> tuple[int, float]:
+    """How many poses are tracked in one of two tracks only, and by how much the others differ."""
+    only = np.setxor1d(a.ticks[a.tracked], b.ticks[b.tracked])
+    _, i, j = np.intersect1d(a.ticks[a.tracked], b.ticks[b.tracked], return_indices=True)
+    i, j = np.flatnonzero(a.tracked)[i], np.flatnonzero(b.tracked)[j]
     turned = np.abs(a.R[i] - b.R[j]).max(initial=0.0)
-    return float(max(np.abs(a.p[i] - b.p[j]).max(initial=0.0), turned))
-
-
-def _settled(ticks: Ints) -> slice:
-    return slice(int(np.searchsorted(ticks, ticks[:1].sum() + SETTLED_TICKS)), None)
+    return len(only), float(max(np.abs(a.p[i] - b.p[j]).max(initial=0.0), turned))
 
 
 def hits(take: RecordedTake, reports: Iterator[UsbReport]) -> Array:
@@ -89,6 +81,7 @@ def hits(take: RecordedTake, reports: Iterator[UsbReport]) -> Array:
     for report in reports:
         captured.feed(report)
     decoder = DeviceDecoder(take.model, take.recording.ranges)
+    captured.reader.finish()
     a = join_angles([decoder.decode(captured.reader.take()).angles])
     return np.stack([a.ticks, a.station, a.axis, a.sensor, a.angle_rad], axis=1)
 
@@ -99,8 +92,8 @@ def compare(
     reports: Sequence[UsbReport],
     order: str,
     ends: Sequence[int],
-) -> tuple[int, float]:
-    """Tracked poses (without stations: hits) of a device, and how much the order changes them.
+) -> tuple[int, int, float]:
+    """What the order changes of a device's tracked poses, or without stations of its hits.
 
     Args:
         take: the device.
@@ -108,14 +101,17 @@ def compare(
         reports: its reports, as the file has them.
         order: the interface of each input report, in the other order.
         ends: endpoint by interface.
+
+    Returns:
+        How many there are by the file, how many there are in one order only, and the largest
+        difference of the others.
     """
     if stations:
         from_file = track(take, iter(reports), stations)
         other = track(take, reorder(reports, order, ends), stations)
-        return int(from_file.tracked.sum()), far_apart(other, from_file)
-    all_of_file, all_found = hits(take, iter(reports)), hits(take, reorder(reports, order, ends))
-    settled = all_of_file[:1, 0].sum() + SETTLED_TICKS
-    expected, found = (h[h[:, 0] >= settled] for h in (all_of_file, all_found))
-    if expected.shape != found.shape:
-        return len(all_of_file), float("inf")
-    return len(all_of_file), float(np.abs(expected - found).max(initial=0.0))
+        return int(from_file.tracked.sum()), *far_apart(other, from_file)
+    expected, found = hits(take, iter(reports)), hits(take, reorder(reports, order, ends))
+    keys, found_keys = (set(map(tuple, h[:, :4].tolist())) for h in (expected, found))
+    only = len(keys ^ found_keys)
+    apart = 0.0 if only else float(np.abs(expected - found).max(initial=0.0))
+    return len(expected), only, apart

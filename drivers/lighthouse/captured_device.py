@@ -102,4 +102,6 @@ def read_devices(
     devices: dict[tuple[int, int], CapturedDevice] = {}
     for report in reports:
         devices.setdefault(report.device, CapturedDevice(model)).feed(report)
+    for device in devices.values():
+        device.reader.finish()
     return devices

@@ -1,5 +1,6 @@
 """Reports of one device -> its raw events: samples sorted, repeats dropped, times unwrapped."""
 
+from lobstr_hw.drivers.lighthouse.beginning import Beginning, LightReport
 from lobstr_hw.drivers.lighthouse.compact_light import parse_compact_light
 from lobstr_hw.drivers.lighthouse.gen2_words import SyncWord, parse_words
 from lobstr_hw.drivers.lighthouse.radio import Inputs, RadioMessage, parse_message
@@ -54,6 +55,7 @@ class DeviceReader:
         self._in_flight = 0
         self._ticks = Ticks()
         self._sequence: int | None = None
+        self._beginning = Beginning()
         self.battery: float | None = None
         self.charging = False
         self.inputs: Inputs | None = None
@@ -73,10 +75,8 @@ class DeviceReader:
         match parse_report(data):
             case ImuReport(slots):
                 self._add_imu(slots)
-            case PulseReport(pulses):
-                self._add_pulses(pulses)
-            case SweepReport(words):
-                self._add_words(words)
+            case PulseReport() | SweepReport() as light:
+                self._add_cable_light(light)
             case RadioReport(messages):
                 self.gone = False
                 for message in messages:
@@ -97,6 +97,11 @@ class DeviceReader:
         if gen2 != self._gen2_light and not self._old_radio:
             self._gen2_light, self._in_flight = gen2, IN_FLIGHT
 
+    def finish(self) -> None:
+        """No more will come: what still waits for more of the device's samples goes without."""
+        self._beginning.over = True
+        self._release()
+
     def take(self) -> RawEvents:
         """What was heard since the last call."""
         lists, self._lists = self._lists, EventLists()
@@ -110,23 +115,44 @@ class DeviceReader:
         for age, slot in sorted(by_age.items()):
             if newest is None or 0 < age < HALF_ROUND:
                 self._sequence = slot[0]
-                self._lists.imu.append((self._ticks.imu(slot[1]), *slot[2]))
+                ticks = self._ticks.imu(slot[1])
+                self._lists.imu.append((ticks, *slot[2]))
+                self._beginning.sample(ticks)
+        if self._beginning.over:
+            self._release()
+
+    def _release(self) -> None:
+        for light in self._beginning.release():
+            self._add_cable_light(light)
+
+    def _add_cable_light(self, light: LightReport) -> None:
+        if not self._beginning.over:
+            self._beginning.hold(light)
+        elif isinstance(light, PulseReport):
+            self._add_pulses(light.pulses)
+        else:
+            self._add_words(light.words)
 
     def _add_pulses(self, pulses: tuple[tuple[int, int, int], ...]) -> None:
         for port, low, length in pulses:
-            start = self._ticks.light(low, 32)
+            start = self._light_time(low, 32)
             if start is not None:
                 self._lists.pulses.append((port, start, length))
 
     def _add_words(self, data: bytes) -> None:
         for word in parse_words(data):
-            ticks = self._ticks.light(word.time, 24)
+            ticks = self._light_time(word.time, 24)
             if ticks is None:
                 continue
             if isinstance(word, SyncWord):
                 self._lists.syncs.append((word.channel, ticks, word.data_bit, word.g_bit))
             else:
                 self._lists.add_sweep((word.channel, word.port, ticks, word.half_tick))
+
+    def _light_time(self, low: int, bits: int) -> int | None:
+        """None: nobody knows, or it was left over from before."""
+        ticks = self._ticks.light(low, bits)
+        return ticks if ticks is not None and self._beginning.is_true(ticks, bits) else None
 
     def _add_cable(self, said: CableReport) -> None:
         if said.buttons is not None:
