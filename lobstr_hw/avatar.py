@@ -30,6 +30,9 @@ _FOOT_ROLES = (TrackerRole.LEFT_FOOT, TrackerRole.RIGHT_FOOT)
 _LEGS = (*UPPER, *LOWER, *FEET)
 _ARMS = [joint for side in ARM_JOINTS for joint in side]
 _LONGEST_TICK_S = 1.0
+_AHEAD = 0.5
+"""Grid steps by which outputs are shown beyond the slerp of the last two: a whole step late costs a
+tenth of the position, a whole step ahead trembles (docs/decisions.md)."""
 
 
 class Avatar:
@@ -39,7 +42,8 @@ class Avatar:
         predictor: moves the legs.
         body: of n people, in their own sizes.
         loop_rate_hz: of the ticks; the predictor's own if None. When every tick is a grid tick,
-            output j is shown; otherwise the slerp of outputs j - 1 and j.
+            output j is shown; otherwise outputs j - 1 and j, from half way between them to half a
+            step beyond.
         input_delay_s: by which the grid's times lag behind the ticks'.
         lock: settings of the contact lock.
 
@@ -135,7 +139,7 @@ class Avatar:
         if not self._between:
             return shown.newest()
         steps = (time_s - shown.time_s - self._delay_s) * self.predictor.card.rate_hz
-        return shown.between(np.clip(steps, 0.0, 1.0))
+        return shown.between(np.clip(steps, 0.0, 1.0) + _AHEAD)
 
     def _pose_legs(
         self,
