@@ -59,7 +59,9 @@ def from_6d(r6: Array) -> Array:
     z = normalize(r6[..., :3])
     y = r6[..., 3:]
     y = normalize(y - np.sum(y * z, axis=-1, keepdims=True) * z)
-    return np.stack([np.cross(y, z), y, z], axis=-1)
+    # written out: in the predictor's step np.cross takes as long as the network
+    x = y[..., [1, 2, 0]] * z[..., [2, 0, 1]] - y[..., [2, 0, 1]] * z[..., [1, 2, 0]]
+    return np.stack([x, y, z], axis=-1)
 
 
 def from_axis_angle(axis: Array, angle: Array | float) -> Array:
@@ -84,7 +86,13 @@ def rotation_x(angle: Array | float) -> Array:
 
 def rotation_y(angle: Array | float) -> Array:
     """Turn about Y by (...) radians."""
-    return from_axis_angle(np.array([0.0, 1.0, 0.0]), angle)
+    a = np.asarray(angle, dtype=np.float64)
+    R = np.zeros((*a.shape, 3, 3))
+    R[..., 1, 1] = 1.0
+    R[..., 0, 0] = R[..., 2, 2] = np.cos(a)
+    R[..., 0, 2] = np.sin(a)
+    R[..., 2, 0] = -R[..., 0, 2]
+    return R
 
 
 def rotation_z(angle: Array | float) -> Array:
