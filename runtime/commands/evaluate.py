@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lobstr_hw.errors import FileFormatError, LobstrError
+from lobstr_hw.evaluation.clip_pictures import plot_clip
 from lobstr_hw.evaluation.evaluate import evaluate
 from lobstr_hw.evaluation.plots import plot_results
 from lobstr_hw.evaluation.rollout import Mode
@@ -72,7 +73,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--scale", type=float, metavar="M", help="metres per unit of the files")
     parser.add_argument("--split", type=Path, metavar="FILE", help="clips by part (JSON)")
     parser.add_argument("--part", choices=PARTS, help="score only this part of the split")
-    parser.add_argument("--plots", type=Path, metavar="DIR", help="write pictures there")
+    parser.add_argument(
+        "--plots",
+        type=Path,
+        metavar="DIR",
+        help="write pictures there: scores by clip; of the longest one its error over time, its "
+        "contacts and a strip of its legs",
+    )
     parser.add_argument("--table", action="store_true", help="a table with trivial rows instead")
     parser.add_argument("--json", action="store_true", help="JSON on stdout (as without --table)")
     return parser
@@ -84,6 +91,7 @@ def _evaluate(options: argparse.Namespace, stop: StopRequest) -> int:
     results = _score(options.predictor, predictor, clips, options.mode, stop)
     if options.plots:
         plot_results(options.plots, results)
+        plot_clip(options.plots, max(clips, key=len), predictor, options.mode)
     if options.table:
         table = _table(options, results, clips, stop)
         print(table, file=sys.stderr if options.json else sys.stdout)

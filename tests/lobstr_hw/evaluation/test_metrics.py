@@ -1,6 +1,6 @@
 """Laws of the metrics."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -39,7 +39,8 @@ def test_the_first_second_is_not_scored(truth: Truth) -> None:
     legs = perfect(truth)
     p_toes = legs.p_toes.copy()
     p_toes[:45] += 1.0
-    assert tally(truth, replace(legs, p_toes=p_toes)) == tally(truth, legs)
+    ours, theirs = (astuple(tally(truth, one)) for one in (replace(legs, p_toes=p_toes), legs))
+    assert ours == pytest.approx(theirs, rel=1e-12)  # the order of a sum is the processor's
     p_toes[45] += 1.0
     assert tally(truth, replace(legs, p_toes=p_toes)).position_m > 0.0
 

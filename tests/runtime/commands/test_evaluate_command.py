@@ -111,7 +111,8 @@ def test_a_row_of_the_manifest_without_its_file_is_noted(
 def test_pictures_are_written(data: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="pip install 'lobstr-hw[plots]'")
     assert main([str(data / "second"), "--plots", str(tmp_path / "plots")]) == 0
-    assert (tmp_path / "plots" / "position_error_cm.png").stat().st_size > 1000
+    for name in ("position_error_cm", "error_over_time", "contacts", "legs"):
+        assert (tmp_path / "plots" / f"{name}.png").stat().st_size > 1000
 
 
 def test_a_missing_path_and_an_unknown_predictor_fail_with_one_message(
