@@ -8,18 +8,14 @@ Simulated users wear trackers, calibrate by a sloppy T-pose and do clips; the le
 import argparse
 import datetime
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from measure_sim import between
 from results_page import shown, write_section
-from rich.progress import Progress
+from session_error import SETTLE_S, calibrated, session_error
 
-from lobstr_hw.calibration import Calibration, TPoseDetector, calibrate_t_pose, save_profile
-from lobstr_hw.drivers.replay import ReplayDriver
 from lobstr_hw.evaluation.truth import Truth
 from lobstr_hw.features import reference_frames
 from lobstr_hw.lower_body import toes_in_reference, true_lower_body
@@ -29,31 +25,18 @@ from lobstr_hw.predictors.lobstr import GIVES
 from lobstr_hw.predictors.predictor import Bools
 from lobstr_hw.retargeting import find_clips, retarget
 from lobstr_hw.rotations import Array
-from lobstr_hw.runtime.commands.log_make import write_take
-from lobstr_hw.runtime.commands.log_report import Step
-from lobstr_hw.runtime.live import LiveOptions, LiveSession
-from lobstr_hw.simulation import (
-    SimulatedTake,
-    TrackingErrors,
-    drawn_user,
-    joined,
-    simulate,
-    take_samples,
-)
+from lobstr_hw.simulation import SimulatedTake, drawn_user, joined, simulate
 from lobstr_hw.skeleton import STATURE, Body, Joint, local_rotations
-from lobstr_hw.skeleton_pose import SkeletonPose
 from lobstr_hw.trackers import FOUR_POINTS, TrackerRole
 
 TITLE = "## Steadiness"
 LONGEST_S = 20.0
 SHORTEST_S = 8.0
-SETTLE_S = 2.5
 GRID_HZ = 45.0
 STATURES_CM = (150, 160, 170, 180, 195)
 RATES_HZ = (45, 60, 72, 90, 120)
 MINUTES = 30
 PELVIS = FOUR_POINTS.index(TrackerRole.PELVIS)
-TOES = [Joint.LEFT_TOES, Joint.RIGHT_TOES]
 
 
 @dataclass(frozen=True)
@@ -170,7 +153,7 @@ def _mean_of(errors: Sequence[Array], worn: Sequence[Worn]) -> float:
 
 
 def _worn(take: SimulatedTake) -> Worn:
-    calibration = _calibrated(take)
+    calibration = calibrated(take)
     step = round((1.0 / GRID_HZ) / (take.times_s[1] - take.times_s[0]))
     p, R, tracked = take.p[::step], take.R[::step], take.tracked[::step]
     frame = calibration.frame(0.0, FOUR_POINTS, p, R, tracked, tracked)
@@ -186,14 +169,6 @@ def _toes_of_truth(take: SimulatedTake) -> Array:
     return toes_in_reference(
         true_lower_body(R_local, reference_frames(take.truth_R[:, Joint.HIPS]))
     )
-
-
-def _calibrated(take: SimulatedTake) -> Calibration:
-    detector = TPoseDetector({serial: role for role, serial in take.serials.items()})
-    pose = detector.add(take_samples(take))
-    if pose is None:
-        raise detector.failure()
-    return calibrate_t_pose(pose)
 
 
 def _errors(predictor: Predictor, worn: Sequence[Worn]) -> list[Array]:
@@ -236,62 +211,12 @@ def _rates(predictor: str, motions: Sequence[Motion], seed: int) -> str:
         for rate in RATES_HZ:
             _say(f"{name}: {rate} Hz")
             each = [
-                _session_error(predictor, m, seed + i, tracker_hz or rate, rate)
+                session_error(predictor, m, seed + i, tracker_hz or rate, rate)
                 for i, m in enumerate(motions)
             ]
             errors.append(float(np.concatenate(each).mean()))
         rows.append(f"| {name} | {_with_extremes(errors)}")
     return "\n".join(rows) + "\n"
-
-
-def _session_error(
-    predictor: str, motion: Motion, seed: int, tracker_hz: float, loop_hz: float
-) -> Array:
-    """Errors (ticks,) of a whole session on a log, calibrated alike for every rate."""
-    take = simulate(motion, seed, rate_hz=tracker_hz, errors=TrackingErrors.none())
-    reference = _calibrated(simulate(motion, seed, errors=TrackingErrors.none()))
-    with tempfile.TemporaryDirectory() as folder:
-        log, profile = Path(folder) / "take.mcap", Path(folder) / "profile.json"
-        _write(log, take)
-        save_profile(profile, reference)
-        options = LiveOptions(
-            profile=profile, predictor=predictor, rate_hz=loop_hz, fast=True, quiet=True
-        )
-        poses: list[SkeletonPose] = []
-        with LiveSession(ReplayDriver(log), options, lambda text: None) as live:
-            live.outputs.append(_Kept(poses))
-            live.run(lambda: False)
-    poses = [pose for pose in poses if pose.time_s > take.t_pose_s[1] + SETTLE_S]
-    p = np.concatenate([pose.p_world for pose in poses])
-    times = np.array([pose.time_s for pose in poses])
-    truth = between(times, take.truth_times_s, take.truth_p)
-    apart = (p - p[:, :1] - truth + truth[:, :1])[:, TOES]
-    return np.asarray(100.0 * np.linalg.norm(apart, axis=-1).mean(-1))
-
-
-def _write(log: Path, take: SimulatedTake) -> None:
-    with Progress(disable=True) as progress:
-        write_take(log, take, {}, Step(progress, progress.add_task("")))
-
-
-@dataclass(frozen=True)
-class _Kept:
-    """An output that keeps what is shown."""
-
-    poses: list[SkeletonPose]
-
-    def open(self, body: Body, rate_hz: float, take: str) -> None:
-        """Nothing to open."""
-
-    def calibrated(self, body: Body) -> None:
-        """Nothing to do."""
-
-    def send(self, pose: SkeletonPose, samples: Sequence[object]) -> None:
-        """Keep it."""
-        self.poses.append(pose)
-
-    def close(self) -> None:
-        """Nothing to close."""
 
 
 # a lost pelvis, and half an hour
