@@ -48,7 +48,7 @@ class StreamDriver(TrackerDriver):
     """A driver whose device sends on its own; a subclass has ``_connect`` and ``_info``.
 
     A device with a clock gives the samples' times (DeviceClock); of one without, a sample has the
-    time at which the reading thread got it. A tracker's times never go back; trackers with clocks
+    time at which the reading thread got it. Times of one clock never go back; trackers with clocks
     of their own may be told later one than the other.
     """
 
@@ -56,6 +56,7 @@ class StreamDriver(TrackerDriver):
         """Nothing is open."""
         self._thread: ReadingThread | None = None
         self._clocks: defaultdict[str, DeviceClock] = defaultdict(DeviceClock)
+        self._given_s: defaultdict[str, float] = defaultdict(float)  # by clock
         self._trackers: dict[str, _Tracker] = {}
         self._events: list[DeviceEvent] = []
         self._waiting: deque[tuple[float, Arrival]] = deque(maxlen=QUEUE_LENGTH)
@@ -118,6 +119,7 @@ class StreamDriver(TrackerDriver):
 
     def _begin(self) -> None:
         self._clocks.clear()
+        self._given_s.clear()
         self._trackers.clear()
         self._events.clear()
         self._waiting.clear()
@@ -131,7 +133,8 @@ class StreamDriver(TrackerDriver):
         measured_s, tracker = arrived_s, self._trackers.get(what.serial)
         if what.device_s is not None:
             measured_s = min(arrived_s, self._clocks[what.clock].host_s(what.device_s))
-        return max(0.0 if tracker is None else tracker.last_s, measured_s + self._lead_s)
+        last_s = 0.0 if tracker is None else tracker.last_s
+        return max(last_s, self._given_s[what.clock], measured_s + self._lead_s)
 
     def _heard(self, arrived_s: float, what: Arrival) -> list[TrackerSample]:
         time_s = self._time(arrived_s, what)
@@ -153,6 +156,7 @@ class StreamDriver(TrackerDriver):
     def _read(self, reading: Reading, arrived_s: float, time_s: float) -> list[TrackerSample]:
         tracker = self._trackers.setdefault(reading.serial, _Tracker())
         tracker.arrived_s, tracker.last_s = arrived_s, time_s
+        self._given_s[reading.clock] = time_s
         if tracker.gone:
             tracker.gone = False
             self._events.append(DeviceEvent(EventKind.BACK, reading.serial, time_s))
