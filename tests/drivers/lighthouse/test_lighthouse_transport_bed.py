@@ -111,10 +111,11 @@ import os, sys
 import hid, hidraw, usb.core, usb.util, usb.backend.libusb1, libusb_package
 from lobstr_hw.drivers.lighthouse.transports import choose_transport
 from lobstr_hw.errors import DriverError
+transport = choose_transport(sys.argv[1])
+listed = transport.enumerate()  # what is loaded by this may lie where nobody may read
 os.setresgid(65534, 65534, 65534)
 os.setresuid(65534, 65534, 65534)
-transport = choose_transport(sys.argv[1])
-for info in transport.enumerate():
+for info in listed:
     try:
         transport.open(info).close()
     except DriverError as error:
