@@ -97,7 +97,8 @@ class Avatar:
         Returns:
             The new state and the body in the user's size.
         """
-        inner, shown, lock = self._predict(state, grid)
+        inner, shown = self._predict(state, grid)
+        lock = ContactLock(**_part(state, "lock"))
         p_hips, R_hips = frame.p[:, frame.index(TrackerRole.PELVIS)], _R(frame, TrackerRole.PELVIS)
         R_ref = heading(R_hips, state["avatar.R_ref"])
         R_given = self._given(shown, frame.time_s)
@@ -126,13 +127,12 @@ class Avatar:
             "avatar.R_ref": heading(T[:, :3, :3]) @ state["avatar.R_ref"],
         }
 
-    def _predict(self, state: State, grid: Sequence[Frame]) -> tuple[State, LastTwo, ContactLock]:
-        inner = _part(state, "predictor")
-        shown, lock = LastTwo(**_part(state, "shown")), ContactLock(**_part(state, "lock"))
+    def _predict(self, state: State, grid: Sequence[Frame]) -> tuple[State, LastTwo]:
+        inner, shown = _part(state, "predictor"), LastTwo(**_part(state, "shown"))
         for frame in grid:
             inner, prediction = self.predictor.step(inner, frame)
             shown = shown.add(prediction, frame.time_s)
-        return inner, shown, lock
+        return inner, shown
 
     def _given(self, shown: LastTwo, time_s: float) -> Array:
         """Rotations (n, joints given, 3, 3) for this tick."""

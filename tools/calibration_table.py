@@ -11,10 +11,11 @@ import argparse
 import datetime
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from made_takes import first_seconds
 from results_page import shown, write_section
 
 from lobstr_hw.calibration import Calibration, TPose, TPoseDetector, calibrate_t_pose
@@ -62,14 +63,7 @@ def _motions(paths: Sequence[Path], seed: int) -> list[Motion]:
         rng = np.random.default_rng(seed)
         return [t_pose_motion(1.0, 45.0, PoseDeviation.none(), Sway.none(), rng)]
     motions = [m for m in retarget(find_clips(paths)) if m.duration_s > 1.0]
-    return [_first_seconds(motion) for motion in motions]
-
-
-def _first_seconds(motion: Motion) -> Motion:
-    n = round(CLIP_S * motion.rate_hz)
-    return replace(
-        motion, p_hips=motion.p_hips[:n], R_local=motion.R_local[:n], p_toes=motion.p_toes[:n]
-    )
+    return [first_seconds(motion, CLIP_S) for motion in motions]
 
 
 def _section(motions: Sequence[Motion], users: int, seed: int, deviation_deg: float) -> str:

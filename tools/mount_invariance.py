@@ -9,14 +9,14 @@ calibrates by the T-pose each time, and the two lower bodies are compared joint 
 import argparse
 import datetime
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from made_takes import calibrated, first_seconds
 from results_page import write_section
 
 from lobstr_hw.avatar import Avatar
-from lobstr_hw.calibration import Calibration, TPoseDetector, calibrate_t_pose
+from lobstr_hw.calibration import Calibration
 from lobstr_hw.motion import Motion
 from lobstr_hw.predictors import load_predictor
 from lobstr_hw.predictors.predictor import Frame, Predictor
@@ -28,7 +28,6 @@ from lobstr_hw.simulation import (
     TrackingErrors,
     drawn_user,
     simulate,
-    take_samples,
 )
 from lobstr_hw.skeleton import Body, Joint
 from lobstr_hw.trackers import FOUR_POINTS
@@ -59,7 +58,7 @@ def main() -> int:
     args = parser.parse_args()
     predictor = load_predictor(args.predictor)
     motions = [m for m in retarget(find_clips(args.clips)) if m.duration_s > 3.0]
-    motions = [_first_seconds(motion) for motion in motions]
+    motions = [first_seconds(motion, LONGEST_S) for motion in motions]
     seeds = [1000 * args.seed + i for i in range(args.users)]
     text = "\n".join([_head(args, motions), *_table(predictor, motions, seeds)])
     print(text)
@@ -111,7 +110,7 @@ def apart(
 
 def _legs(predictor: Predictor, takes: Sequence[SimulatedTake]) -> Array:
     """Local rotations (ticks, takes, 6, 3, 3) of the output skeletons, all takes in one batch."""
-    calibrations = [_calibrated(take) for take in takes]
+    calibrations = [calibrated(take) for take in takes]
     parts = [c.body for c in calibrations]
     body = Body(
         np.concatenate([b.offsets for b in parts]),
@@ -146,14 +145,6 @@ def _frames(
     return [Frame(i / 45.0, roles, p[i], R[i], valid[i], valid[i]) for i in range(len(p))]
 
 
-def _calibrated(take: SimulatedTake) -> Calibration:
-    detector = TPoseDetector({serial: role for role, serial in take.serials.items()})
-    pose = detector.add(take_samples(take))
-    if pose is None:
-        raise detector.failure()
-    return calibrate_t_pose(pose)
-
-
 def _columns(joints: Sequence[Joint]) -> list[int]:
     order = [j for group in LOWER_BODY.values() for j in group]
     return [order.index(joint) for joint in joints]
@@ -161,13 +152,6 @@ def _columns(joints: Sequence[Joint]) -> list[int]:
 
 def _two(values: Array) -> str:
     return f"{np.median(values):.2f} / {np.percentile(values, 95.0):.2f}"
-
-
-def _first_seconds(motion: Motion) -> Motion:
-    n = round(LONGEST_S * motion.rate_hz)
-    return replace(
-        motion, p_hips=motion.p_hips[:n], R_local=motion.R_local[:n], p_toes=motion.p_toes[:n]
-    )
 
 
 def _head(args: argparse.Namespace, motions: Sequence[Motion]) -> str:

@@ -6,15 +6,15 @@ at random places, Lighthouse errors and a sloppy T-pose, and is calibrated from 
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from made_takes import calibrated, first_seconds
 from paper_rows import Trained
 from paper_scores import legs_of
 
-from lobstr_hw.calibration import Calibration, TPoseDetector, calibrate_t_pose
 from lobstr_hw.evaluation.activities import activities
 from lobstr_hw.evaluation.truth import Truth
 from lobstr_hw.features import (
@@ -29,7 +29,7 @@ from lobstr_hw.lower_body import toes_in_reference, true_lower_body
 from lobstr_hw.motion import Motion
 from lobstr_hw.retargeting import find_clips, retarget
 from lobstr_hw.rotations import Array, geodesic_angle
-from lobstr_hw.simulation import SimulatedTake, simulate, take_samples
+from lobstr_hw.simulation import SimulatedTake, simulate
 from lobstr_hw.skeleton import Joint, local_rotations
 from lobstr_hw.splits import clip_name
 from lobstr_hw.trackers import FOUR_POINTS, ROLE_JOINT
@@ -108,12 +108,7 @@ def motions(data: Path) -> list[Motion]:
     """The first seconds of each clip."""
     sets = {name.split("/")[0] for name in CLIPS}
     found = [clip for clip in find_clips([data]) if clip.set_name in sets]
-    n = round(LONGEST_S * RATE_HZ)
-    return [
-        replace(m, p_hips=m.p_hips[:n], R_local=m.R_local[:n], p_toes=m.p_toes[:n])
-        for m in retarget(found)
-        if clip_name(m.name) in CLIPS
-    ]
+    return [first_seconds(m, LONGEST_S) for m in retarget(found) if clip_name(m.name) in CLIPS]
 
 
 def recordings(clips: Sequence[Motion], stature_cm: int, seed: int) -> list[Worn]:
@@ -122,7 +117,7 @@ def recordings(clips: Sequence[Motion], stature_cm: int, seed: int) -> list[Worn
 
 
 def _worn(take: SimulatedTake) -> Worn:
-    calibration = _calibrated(take)
+    calibration = calibrated(take)
     p, R, tracked = take.p[::2], take.R[::2], take.tracked[::2]  # 90 Hz to the grid's 45
     frame = calibration.frame(0.0, FOUR_POINTS, p, R, tracked, tracked)
     order = [FOUR_POINTS.index(role) for role in POINT_ROLES]
@@ -139,14 +134,6 @@ def _worn(take: SimulatedTake) -> Worn:
         activities(truth)[:n],
         round((take.t_pose_s[1] + SETTLE_S) * RATE_HZ),
     )
-
-
-def _calibrated(take: SimulatedTake) -> Calibration:
-    detector = TPoseDetector({serial: role for role, serial in take.serials.items()})
-    pose = detector.add(take_samples(take))
-    if pose is None:
-        raise detector.failure()
-    return calibrate_t_pose(pose)
 
 
 def _truth(take: SimulatedTake) -> Truth:

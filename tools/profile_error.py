@@ -9,10 +9,11 @@ predictor three times: by the true offsets, by the profile after the movement, b
 import argparse
 import datetime
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from made_takes import first_seconds
 from results_page import shown, write_section
 
 from lobstr_hw.calibration import (
@@ -70,20 +71,14 @@ def main() -> int:
     predictor = load_predictor(args.predictor)
     motions = [m for m in retarget(find_clips(args.clips)) if m.duration_s >= SHORTEST_S]
     wearers = [
-        _wearer(args.seed + i, _first_seconds(motions[i % len(motions)])) for i in range(args.users)
+        _wearer(args.seed + i, first_seconds(motions[i % len(motions)], LONGEST_S))
+        for i in range(args.users)
     ]
     text = "\n".join([_head(args, wearers), *_table(predictor, wearers)])
     print(text)
     if args.write:
         write_section(text)
     return 0
-
-
-def _first_seconds(motion: Motion) -> Motion:
-    n = round(LONGEST_S * motion.rate_hz)
-    return replace(
-        motion, p_hips=motion.p_hips[:n], R_local=motion.R_local[:n], p_toes=motion.p_toes[:n]
-    )
 
 
 def _wearer(seed: int, motion: Motion) -> Wearer:

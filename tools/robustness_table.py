@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from made_takes import calibrated, first_seconds
 from results_page import shown, write_section
-from session_error import SETTLE_S, calibrated, session_error
+from session_error import SETTLE_S, session_error
 
 from lobstr_hw.evaluation.truth import Truth
 from lobstr_hw.features import reference_frames
@@ -68,7 +69,7 @@ def main() -> int:
     predictor = load_predictor(args.predictor)
     motions = [m for m in retarget(find_clips(args.clips)) if m.duration_s >= SHORTEST_S]
     chosen = [motions[i * len(motions) // args.users] for i in range(args.users)]
-    short = [_first_seconds(motion) for motion in chosen]
+    short = [first_seconds(motion, LONGEST_S) for motion in chosen]
     parts = [
         _statures(predictor, short, args.seed),
         _mounts(predictor, short, args.seed),
@@ -81,13 +82,6 @@ def main() -> int:
     if args.write:
         write_section(text)
     return 0
-
-
-def _first_seconds(motion: Motion) -> Motion:
-    n = round(LONGEST_S * motion.rate_hz)
-    return replace(
-        motion, p_hips=motion.p_hips[:n], R_local=motion.R_local[:n], p_toes=motion.p_toes[:n]
-    )
 
 
 # statures and mounts
@@ -293,7 +287,7 @@ def _drift(predictor: Predictor, motions: Sequence[Motion], seed: int) -> str:
 
 def _a_minute(motions: Sequence[Motion]) -> list[Motion]:
     out: list[Motion] = []
-    for motion in map(_first_seconds, motions):
+    for motion in (first_seconds(m, LONGEST_S) for m in motions):
         if sum(m.duration_s for m in out) < 56.0:
             out.append(motion)
     return out

@@ -6,17 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from made_takes import calibrated
 from measure_sim import between
 from rich.progress import Progress
 
-from lobstr_hw.calibration import Calibration, TPoseDetector, calibrate_t_pose, save_profile
+from lobstr_hw.calibration import save_profile
 from lobstr_hw.drivers.replay import ReplayDriver
 from lobstr_hw.motion import Motion
 from lobstr_hw.rotations import Array
 from lobstr_hw.runtime.commands.log_make import write_take
 from lobstr_hw.runtime.commands.log_report import Step
 from lobstr_hw.runtime.live import LiveOptions, LiveSession
-from lobstr_hw.simulation import SimulatedTake, TrackingErrors, simulate, take_samples
+from lobstr_hw.simulation import SimulatedTake, TrackingErrors, simulate
 from lobstr_hw.skeleton import Body, Joint
 from lobstr_hw.skeleton_pose import SkeletonPose
 
@@ -72,12 +73,3 @@ class _Kept:
 
     def close(self) -> None:
         """Nothing to close."""
-
-
-def calibrated(take: SimulatedTake) -> Calibration:
-    """By the take's own T-pose."""
-    detector = TPoseDetector({serial: role for role, serial in take.serials.items()})
-    pose = detector.add(take_samples(take))
-    if pose is None:
-        raise detector.failure()
-    return calibrate_t_pose(pose)
