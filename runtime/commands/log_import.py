@@ -48,9 +48,7 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
 
 def run(options: argparse.Namespace) -> Report:
     """Write the log."""
-    *files, out = [*options.files, options.output] if options.output else options.files
-    if not files:
-        raise FileFormatError(f"which log should {out} become? Name it with --output LOG.mcap.")
+    files, out = _sources_and_log(options)
     kinds = {path: recording_kind(path) for path in files}
     for path, kind in kinds.items():
         if kind is RecordingKind.UNKNOWN or (kind is RecordingKind.CSV and len(files) > 1):
@@ -59,6 +57,23 @@ def run(options: argparse.Namespace) -> Report:
         if kinds[files[0]] is RecordingKind.CSV:
             return import_csv(files[0], out, step)
         return _lighthouse(files, out, options, step)
+
+
+def _sources_and_log(options: argparse.Namespace) -> tuple[list[Path], Path]:
+    """What to read, what to write; the last FILE is the log only where it cannot be a recording."""
+    if options.output:
+        return options.files, options.output
+    *files, out = options.files
+    if not files:
+        raise FileFormatError(f"which log should {out} become? Name it with --output LOG.mcap.")
+    is_recording = out.exists() and recording_kind(out) is not RecordingKind.UNKNOWN
+    if is_recording or out.suffix != ".mcap":
+        raise FileFormatError(
+            f"{out} is the last FILE, which would become the log, but it "
+            f"{'is a recording' if is_recording else 'does not end in .mcap'}. "
+            "Name the log with --output LOG.mcap."
+        )
+    return files, out
 
 
 def _lighthouse(files: list[Path], out: Path, options: argparse.Namespace, step: Step) -> Report:

@@ -308,6 +308,19 @@ class TestImport:
         assert "line 3" in err and why in err
         assert not (tmp_path / "a.mcap").exists()
 
+    @pytest.mark.parametrize("name", ["b.csv", "b.mcap", "missing.pcap"])
+    def test_a_recording_named_last_is_not_written_over(
+        self, made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+    ) -> None:
+        first, last = tmp_path / "a.csv", tmp_path / name
+        main(["export", str(made), "--csv", str(first)])
+        if name != "missing.pcap":
+            last.write_bytes(first.read_bytes())
+        capsys.readouterr()
+        assert main(["import", str(first), str(last)]) == 1
+        assert "Name the log with --output" in capsys.readouterr().err
+        assert not last.exists() or last.read_bytes() == first.read_bytes()
+
     def test_another_file_says_what_is_known(
         self, made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
