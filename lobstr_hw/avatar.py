@@ -23,14 +23,14 @@ from lobstr_hw.trackers import ROLE_JOINT, TrackerRole
 from lobstr_hw.upper_body import ARM_JOINTS, SPINE_JOINTS, pose_upper_body
 from lobstr_hw.world_kinematics import positions
 
-__all__ = ["Avatar"]
+__all__ = ["AHEAD", "Avatar"]
 
 _HANDS = (TrackerRole.LEFT_HAND, TrackerRole.RIGHT_HAND)
 _FOOT_ROLES = (TrackerRole.LEFT_FOOT, TrackerRole.RIGHT_FOOT)
 _LEGS = (*UPPER, *LOWER, *FEET)
 _ARMS = [joint for side in ARM_JOINTS for joint in side]
 _LONGEST_TICK_S = 1.0
-_AHEAD = 0.5
+AHEAD = 0.5
 """Grid steps by which outputs are shown beyond the slerp of the last two: a whole step late costs a
 tenth of the position, a whole step ahead trembles (docs/decisions.md)."""
 
@@ -139,7 +139,7 @@ class Avatar:
         if not self._between:
             return shown.newest()
         steps = (time_s - shown.time_s - self._delay_s) * self.predictor.card.rate_hz
-        return shown.between(np.clip(steps, 0.0, 1.0) + _AHEAD)
+        return shown.between(np.clip(steps, 0.0, 1.0) + AHEAD)
 
     def _pose_legs(
         self,

@@ -1,8 +1,8 @@
 """The contact lock: a foot that is on the floor stays where it is (Yang et al. 2021, 3.4.1).
 
-What the paper leaves open (hysteresis, the floor, early release) is decided in design's "Contact
-and floor". Lengths are metres on the standard skeleton, times are seconds: the lock behaves the
-same at every rate of the loop.
+What the paper leaves open (hysteresis, the floor, early release) is decided in docs/decisions.md,
+"The contact lock lets go by a spring, ...". Lengths are metres on the standard skeleton, times are
+seconds: the lock behaves the same at every rate of the loop.
 """
 
 from dataclasses import dataclass, replace

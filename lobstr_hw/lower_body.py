@@ -14,6 +14,7 @@ __all__ = [
     "JOINT_ORDER",
     "LEG_JOINTS",
     "POSE_SIZE",
+    "leg_points_in_reference",
     "mirror_pose_6d",
     "pose_6d",
     "pose_from_6d",
@@ -65,6 +66,17 @@ def mirror_pose_6d(pose: Array) -> Array:
     sides = pose.reshape(*pose.shape[:-1], 2, 4, 6)[..., ::-1, :, :].copy()
     sides[..., ::3] *= -1.0  # the x of the Z axis and of the Y axis
     return np.asarray(sides.reshape(pose.shape))
+
+
+def leg_points_in_reference(joints: Array) -> Array:
+    """Hip, knee, ankle and toe base (..., 2, 4, 3) in the reference frame, standard skeleton."""
+    offsets = np.stack([STANDARD_OFFSETS[list(leg)] for leg in LEG_JOINTS])  # (2, 4, 3)
+    R = joints[..., 0, :, :]
+    points = [(R @ offsets[:, 0, :, None])[..., 0]]
+    for i in (1, 2, 3):
+        R = R @ joints[..., i, :, :]
+        points.append(points[-1] + (R @ offsets[:, i, :, None])[..., 0])
+    return np.stack(points, axis=-2)
 
 
 def toes_in_reference(joints: Array) -> Array:

@@ -49,6 +49,6 @@ class LastTwo:
         return self.R[:, 1]
 
     def between(self, fraction: Array) -> Array:
-        """Outputs j - 1 and j, joint by joint, at a fraction (n,) of the step."""
+        """From output j - 1 to j, joint by joint, at a share (n,) of the step, or beyond."""
         w = log_rotation(np.swapaxes(self.R[:, 0], -1, -2) @ self.R[:, 1])
         return np.asarray(self.R[:, 0] @ turn(fraction[:, None, None] * w))

@@ -6,6 +6,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from lobstr_hw.avatar import AHEAD
 from lobstr_hw.drivers.driver import TrackerDriver
 from lobstr_hw.drivers.replay import ReplayDriver
 from lobstr_hw.errors import OutputError
@@ -240,7 +241,7 @@ class LiveSession:
     def summary(self) -> Summary:
         """What the session was like so far."""
         card = self.session.predictor.card
-        between = 0.0 if self.ticks.grid.every_tick else 1.0 / card.rate_hz
+        between = 0.0 if self.ticks.grid.every_tick else (1.0 - AHEAD) / card.rate_hz
         delay_s = self.options.input_delay_s + between + card.delay_frames / card.rate_hz
         return self.tally.summary(
             self.ticks,

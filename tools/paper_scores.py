@@ -16,6 +16,7 @@ import torch
 from paper_rows import Trained
 
 from lobstr_hw.evaluation.metrics import Scores, Tally, network_legs, tally
+from lobstr_hw.evaluation.rollout import Rollout
 from lobstr_hw.evaluation.truth import Truth
 from lobstr_hw.features import POINT_ROLES, clip_features, clip_points, input_size
 from lobstr_hw.predictors.lobstr import prediction_from_6d
@@ -90,9 +91,7 @@ def legs_of(outputs: Outputs) -> tuple[Array, Array]:
     said = prediction_from_6d(outputs.pose, outputs.logits)
     if said.C is None:
         raise AssertionError("the network gives C")
-    legs = said.R.reshape(-1, 2, 3, 3, 3)
-    U = np.swapaxes(said.C, -1, -2) @ legs[:, :, 0]
-    return np.concatenate([said.C[:, :, None], U[:, :, None], legs[:, :, 1:]], axis=2), said.contact
+    return Rollout(said.R, said.C, said.contact).joints, said.contact
 
 
 def cost_of(row: Trained) -> Cost:

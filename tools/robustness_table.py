@@ -17,6 +17,7 @@ from made_takes import calibrated, first_seconds
 from results_page import shown, write_section
 from session_error import SETTLE_S, session_error
 
+from lobstr_hw.evaluation.rollout import Rollout
 from lobstr_hw.evaluation.truth import Truth
 from lobstr_hw.features import reference_frames
 from lobstr_hw.lower_body import toes_in_reference, true_lower_body
@@ -178,10 +179,8 @@ def _errors(predictor: Predictor, worn: Sequence[Worn]) -> list[Array]:
         frame = Frame(i / GRID_HZ, FOUR_POINTS, p, R, valid, valid)
         state, prediction = predictor.step(state, frame)
         assert prediction.C is not None and predictor.card.gives == GIVES
-        legs = prediction.R.reshape(-1, 2, 3, 3, 3)
-        U = np.swapaxes(prediction.C, -1, -2) @ legs[:, :, 0]
-        joints = np.concatenate([prediction.C[:, :, None], U[:, :, None], legs[:, :, 1:]], axis=2)
-        said.append(toes_in_reference(joints))
+        legs = Rollout(prediction.R, prediction.C, prediction.contact)
+        said.append(toes_in_reference(legs.joints))
     toes = np.stack(said, axis=1)  # (n, frames, 2, 3)
     return [
         100.0 * np.linalg.norm(toes[k, : len(w.p)] - w.toes, axis=-1).mean(-1)
@@ -220,11 +219,8 @@ def _recovery(predictor: Predictor, motions: Sequence[Motion], seed: int) -> str
     _say("a lost pelvis")
     worn = [_worn(simulate(m, seed + i)) for i, m in enumerate(motions)]
     lost = [_without_pelvis(w, every_s=4.0) for w in worn]
-    whole = np.concatenate(
-        [e[w.since :] for e, w in zip(_errors(predictor, worn), worn, strict=True)]
-    )
-    base = float(whole.mean())
     good, bad = _errors(predictor, worn), _errors(predictor, lost)
+    base = _mean_of(good, worn)
     after: dict[int, list[float]] = {}
     for w, u, v, cut in zip(worn, good, bad, lost, strict=True):
         for start in _returns(w, cut):

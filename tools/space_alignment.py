@@ -118,7 +118,8 @@ median.
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--write", action="store_true")
+    options = parser.parse_args()
     text = section()
     print(text)
-    if parser.parse_args().write:
+    if options.write:
         write_section(text)

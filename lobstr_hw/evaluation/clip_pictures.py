@@ -9,12 +9,10 @@ from lobstr_hw.evaluation.after_ik import Shown, show
 from lobstr_hw.evaluation.metrics import network_legs
 from lobstr_hw.evaluation.rollout import Mode, Rollout, roll_out
 from lobstr_hw.evaluation.truth import Truth
-from lobstr_hw.lower_body import LEG_JOINTS
+from lobstr_hw.lower_body import leg_points_in_reference
 from lobstr_hw.predictors import Predictor
-from lobstr_hw.rotations import Array
-from lobstr_hw.skeleton import STANDARD_OFFSETS
 
-__all__ = ["leg_points", "plot_clip"]
+__all__ = ["plot_clip"]
 
 SHOWN_S = 12.0
 STRIP_FRAMES = 10
@@ -37,17 +35,6 @@ def plot_clip(folder: Path, clip: Truth, predictor: Predictor, mode: Mode = "car
     _plot_errors(folder / "error_over_time.png", clip, said, after)
     _plot_contacts(folder / "contacts.png", clip, said, after)
     _plot_legs(folder / "legs.png", clip, said, after)
-
-
-def leg_points(joints: Array) -> Array:
-    """Hip, knee, ankle and toe base (..., 2, 4, 3) in the reference frame, from C, U, L, F."""
-    offsets = np.stack([STANDARD_OFFSETS[list(leg)] for leg in LEG_JOINTS])  # (2, 4, 3)
-    R = joints[..., 0, :, :]
-    points = [(R @ offsets[:, 0, :, None])[..., 0]]
-    for i in (1, 2, 3):
-        R = R @ joints[..., i, :, :]
-        points.append(points[-1] + (R @ offsets[:, i, :, None])[..., 0])
-    return np.stack(points, axis=-2)
 
 
 def _plot_errors(path: Path, clip: Truth, said: Rollout, after: Shown) -> None:
@@ -87,7 +74,7 @@ def _plot_legs(path: Path, clip: Truth, said: Rollout, after: Shown) -> None:
     rows = {"truth": clip.joints, "network": said.joints, "after IK": after.joints}
     for k, frame in enumerate(f for f in frames if f < len(clip)):
         for name, joints in rows.items():
-            points = leg_points(joints[frame])
+            points = leg_points_in_reference(joints[frame])
             for side, style in ((0, "-"), (1, "--")):
                 axes[0].plot(
                     points[side, :, 2] + 0.9 * k,

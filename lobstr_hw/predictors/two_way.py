@@ -133,6 +133,9 @@ def load_two_way(path: Path = SHIPPED_TWO_WAY, threads: int = 1) -> TwoWay:
         raise ModelError(f"{path}: no such weights file. Weights are NAME.onnx beside NAME.json.")
     card = read_card(path.with_suffix(".json"))
     if card.kind != "recording":
-        raise ModelError(f"{path}: '{card.model.name}' is a live network, it sees no future.")
+        raise ModelError(
+            f"{path}: '{card.model.name}' is a live network, which sees "
+            "no future. Take the shipped lobstr-two-way, or weights of --recipe two-way."
+        )
     sizes = {"x": len(card.input_mean), "pose": POSE_SIZE, "contact": 4}
     return TwoWay(card, open_session(path, sizes, threads))

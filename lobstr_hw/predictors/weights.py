@@ -48,7 +48,7 @@ class NetworkCard:
         model: what any predictor tells of itself.
         feature_form: of :mod:`lobstr_hw.features`.
         hidden_size: of the state that goes from step to step.
-        input_mean, input_scale: (37,) z-scoring of the input.
+        input_mean, input_scale: (37,) z-scoring of the input; other sizes in the tables' forms.
         output_mean: (48,) mean pose of the training data; the graph has it in its bias.
         contact_mean: (2,) share of the training frames in contact.
         joint_order: of the 48 outputs.

@@ -7,8 +7,6 @@ soon forgotten.
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import torch
-
 from lobstr_hw.training.checkpoint import Run
 from lobstr_hw.training.config import TrainingConfig
 
@@ -24,7 +22,8 @@ def add_to_average(run: Run, config: TrainingConfig) -> None:
         run.average = {name: value.clone() for name, value in weights.items()}
     kept = min(config.average, run.step / (run.step + 9.0))
     for name, value in weights.items():
-        run.average[name].lerp_(value, 1.0 - kept)
+        # what a checkpoint brought lies on the CPU, wherever the network is
+        run.average[name].lerp_(value.to(run.average[name].device), 1.0 - kept)
 
 
 @contextmanager
@@ -38,5 +37,4 @@ def with_average(run: Run) -> Iterator[None]:
     try:
         yield
     finally:
-        with torch.no_grad():
-            run.network.load_state_dict(own)
+        run.network.load_state_dict(own)

@@ -160,16 +160,28 @@ class TrainingConfig:
     checkpoint_every: int = 50
 
     def __post_init__(self) -> None:
-        """Other networks are trained by windows only.
+        """Refuse settings that go together badly before a training is spent on them.
 
         Raises:
-            ModelError: they would not be.
+            ModelError: says which, and what to change.
         """
         if self.network != "gru" and self.recipe != "paper":
             raise ModelError(
                 f"network {self.network!r} with recipe {self.recipe!r}: the tables' networks are "
                 "trained by windows. Take --recipe paper, or leave --network out."
             )
+        if self.recipe == "two-way" and self.carried.mean_chunks != 1.0:
+            raise ModelError(
+                f"two-way with carried.mean_chunks {self.carried.mean_chunks:g}: each chunk is by "
+                "itself. Set it to 1, or begin with --recipe two-way."
+            )
+        if self.mirror_mean and (self.recipe == "two-way" or not self.mirror):
+            raise ModelError(
+                "mirror_mean is for live networks that learnt from mirror images: set it to false, "
+                "or mirror to true and another recipe."
+            )
+        if self.average > 0.0 and self.recipe != "carried":
+            raise ModelError(f"average is of the recipe carried: set it to 0 for {self.recipe}.")
 
 
 _EPISODES = TrainingConfig(

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +66,7 @@ def network_card(run: Run, config: TrainingConfig, details: dict[str, Any]) -> N
 def export_run(folder: Path, out: Path, metrics: Mapping[str, Path] | None = None) -> ExportError:
     """Write the weights of a run's newest checkpoint as ``out`` (.onnx) with its card.
 
-    A run that kept the weights that were best in validation (recipe ``carried``) gives these.
+    A run that kept the weights that were best in validation gives these, else the mean ones.
 
     Args:
         folder: of the run.
@@ -77,7 +77,8 @@ def export_run(folder: Path, out: Path, metrics: Mapping[str, Path] | None = Non
         ModelError: the folder is no run, or a document cannot be read.
     """
     config = read_config(folder / "config.json")
-    run = load_checkpoint(folder / "checkpoint.pt", config)
+    # exported on the CPU, wherever it was trained
+    run = load_checkpoint(folder / "checkpoint.pt", replace(config, device="cpu"))
     data = _read_json(folder / "data.json")
     weights = run.average if run.best is None else run.best
     if weights is not None:

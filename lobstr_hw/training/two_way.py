@@ -40,13 +40,7 @@ _MARGINS = 2**32 - 1
 def train_two_way(
     run: Run, clips: Clips, validation: Clips | None, config: TrainingConfig
 ) -> Iterator[Run]:
-    """Go on until ``config.steps``, giving the run after each step; it changes in place.
-
-    Raises:
-        ValueError: an episode would be more than one chunk.
-    """
-    if config.carried.mean_chunks != 1.0:
-        raise ValueError("two-way: carried.mean_chunks has to be 1, every chunk is by itself")
+    """Go on until ``config.steps``, giving the run after each step; it changes in place."""
     source = EpisodeSource(clips, config)
     held_out = [] if validation is None else held_out_clips(validation, run, config)
     while run.step < config.steps:

@@ -81,7 +81,9 @@ def _parser() -> argparse.ArgumentParser:
         help="train on the people of the validation part too, and validate nothing",
     )
     parser.add_argument("--seed", type=int, help="of weights, windows and errors (1)")
-    parser.add_argument("--precision", choices=("fp32", "bf16"), help="of the products (fp32)")
+    parser.add_argument(
+        "--precision", choices=("fp32", "bf16"), help="of the products (paper fp32, others bf16)"
+    )
     parser.add_argument(
         "--device", choices=("auto", "cpu", "cuda"), help="auto (default): an accelerator if any"
     )

@@ -8,6 +8,7 @@ from lobstr_hw.features import reference_frames
 from lobstr_hw.lower_body import (
     JOINT_ORDER,
     POSE_SIZE,
+    leg_points_in_reference,
     mirror_pose_6d,
     pose_6d,
     pose_from_6d,
@@ -15,7 +16,7 @@ from lobstr_hw.lower_body import (
     true_lower_body,
 )
 from lobstr_hw.motion import Motion, mirrored
-from lobstr_hw.rotations import Array
+from lobstr_hw.rotations import Array, from_rotation_vector
 from lobstr_hw.skeleton import Joint
 
 
@@ -40,6 +41,15 @@ def test_the_toes_of_the_truth_are_the_toes_of_the_skeleton() -> None:
     toes = walk.p_hips[:, None] + (R_ref[:, None] @ toes_in_reference(joints)[..., None])[..., 0]
     p, _ = walk.joints()
     assert toes == pytest.approx(p[:, [Joint.LEFT_TOES, Joint.RIGHT_TOES]])
+
+
+def test_the_points_of_a_leg_end_at_the_toes_and_keep_their_lengths() -> None:
+    joints = from_rotation_vector(np.random.default_rng(1).normal(scale=0.7, size=(5, 2, 4, 3)))
+    points = leg_points_in_reference(joints)
+    np.testing.assert_allclose(points[..., 3, :], toes_in_reference(joints), atol=1e-12)
+    straight = leg_points_in_reference(np.broadcast_to(np.eye(3), joints.shape))
+    bones, own = (np.linalg.norm(np.diff(p, axis=-2), axis=-1) for p in (points, straight))
+    np.testing.assert_allclose(bones, own, atol=1e-12)
 
 
 def test_mirrored_poses_are_the_poses_of_the_mirrored_motion() -> None:

@@ -17,7 +17,13 @@ from lobstr_hw.training.streams import Position, Streams
 
 PLAIN = CarriedSettings(mean_chunks=3.0, warp_share=0.0, lever_m=0.0, dropout_share=0.0)
 CONFIG = recipe_config(
-    "carried", batch=5, window=10, mirror=False, augmentation=Augmentation("none"), carried=PLAIN
+    "carried",
+    batch=5,
+    window=10,
+    mirror=False,
+    mirror_mean=False,
+    augmentation=Augmentation("none"),
+    carried=PLAIN,
 )
 
 

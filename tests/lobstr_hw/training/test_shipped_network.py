@@ -205,3 +205,20 @@ def test_with_everybody_the_validation_people_are_trained_on_and_nothing_is_vali
         assert described["clips"] == clips_trained == len(described["parts"])
         validated = (out / "validation.csv").read_text(encoding="utf-8").splitlines()
         assert len(validated) == (2 if name == "some" else 1)
+
+
+def test_a_run_made_on_an_accelerator_is_exported_where_there_is_none(
+    clips: Clips, tmp_path: Path
+) -> None:
+    from lobstr_hw.training.checkpoint import new_run, save_checkpoint
+    from lobstr_hw.training.shipping import export_run
+
+    pytest.importorskip("onnx", reason="pip install 'lobstr-hw[train]'")
+    # made here on the CPU; what a checkpoint holds does not tell
+    save_checkpoint(tmp_path / "checkpoint.pt", new_run(SMALL, statistics(clips, SMALL)))
+    write_config(tmp_path / "config.json", replace(SMALL, device="cuda"))
+    (tmp_path / "data.json").write_text("{}", encoding="utf-8")
+    export_run(tmp_path, tmp_path / "out.onnx")
+    assert (
+        load_network(tmp_path / "out.onnx").card.model.details["configuration"]["device"] == "cuda"
+    )

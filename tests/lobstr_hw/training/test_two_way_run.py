@@ -5,12 +5,13 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from support.motions import walking
 
+from lobstr_hw.errors import ModelError
 from lobstr_hw.features import clip_features, clip_points
 from lobstr_hw.lower_body import pose_6d, pose_from_6d
 from lobstr_hw.predictors.two_way import load_two_way
@@ -191,9 +192,19 @@ def test_only_feet_that_stand_pay_for_being_planted() -> None:
     assert cost(1, 1, counted=0.0) == 0.0
 
 
-def test_a_chunk_is_an_episode_of_its_own(clips: Clips) -> None:
-    with pytest.raises(ValueError, match="mean_chunks"):
-        trained(clips, replace(SMALL, carried=CarriedSettings(mean_chunks=3.0)))
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"carried": CarriedSettings(mean_chunks=3.0)},
+        {"mirror_mean": True},
+        {"average": 0.9},
+    ],
+)
+def test_settings_that_do_not_go_with_it_are_refused_before_the_training(
+    change: dict[str, Any],
+) -> None:
+    with pytest.raises(ModelError, match=next(iter(change))):
+        replace(SMALL, **change)
 
 
 @pytest.fixture(scope="module")

@@ -69,7 +69,7 @@ def test_a_log_becomes_files_and_a_summary(
     assert f"{report['frames']} frames" in said.err
 
 
-@pytest.mark.parametrize(("rate", "delay_ms"), [("90", 32.222), ("45", 10.0), ("22.5", 10.0)])
+@pytest.mark.parametrize(("rate", "delay_ms"), [("90", 21.111), ("45", 10.0), ("22.5", 10.0)])
 def test_the_legs_delay_is_told(
     log: Path, rate: str, delay_ms: float, capsys: pytest.CaptureFixture[str]
 ) -> None:
