@@ -179,12 +179,25 @@ def _start(
     if resume:
         run = load_checkpoint(checkpoint, config)
         run.carried = part_of(run.carried, who)
-        return run
-    if checkpoint.exists():
+        _check_steps(out / "config.json", config)
+    elif checkpoint.exists():
         raise ModelError(f"{checkpoint} exists: go on with --resume, or give another --out.")
+    else:
+        run = new_run(config, statistics(train, config))
     if who.first:
         write_config(out / "config.json", config)
-    return new_run(config, statistics(train, config))
+    return run
+
+
+def _check_steps(kept: Path, config: "TrainingConfig") -> None:
+    from lobstr_hw.training.config import read_config
+
+    planned = read_config(kept).steps
+    if config.schedule == "cosine" and planned != config.steps:
+        raise ModelError(
+            f"this run's learning rate was laid out for {planned} steps and would jump up again: "
+            f"go on without --steps, or start anew with --steps {config.steps} in another --out."
+        )
 
 
 def _run(

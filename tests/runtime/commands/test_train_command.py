@@ -56,9 +56,26 @@ def test_a_run_trains_resumes_and_exports(
     assert len((run / "curve.csv").read_text(encoding="utf-8").splitlines()) == 1 + 6
     assert main(["--export", str(run), str(tmp_path / "net.onnx")]) == 0
     details = load_predictor(str(tmp_path / "net.onnx")).card.details
-    assert details["steps_done"] == 6
+    assert details["steps_done"] == details["steps_planned"] == 6
     assert details["data"]["clips"] == 2
     assert details["data"]["minutes_by_set"] == {"made": 0.2}
+
+
+@pytest.mark.torch
+def test_a_cosine_is_not_stretched_in_the_middle_of_a_run(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for module in ("torch", "tqdm", "matplotlib"):
+        pytest.importorskip(module, reason=CURE)
+    from lobstr_hw.training.config import read_config, write_config
+
+    run = tmp_path / "run"
+    assert main(arguments(data, run)) == 0
+    config = read_config(run / "config.json", schedule="cosine")
+    write_config(run / "config.json", config)
+    more = [str(data), "--split", str(data / "split.json"), "--out", str(run), "--resume"]
+    assert main([*more, "--steps", str(config.steps + 2)]) == 1
+    assert f"for {config.steps} steps" in capsys.readouterr().err
 
 
 @pytest.mark.torch
