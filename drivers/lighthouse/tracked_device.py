@@ -8,6 +8,7 @@ from when a packet came, nor from how many were handed over at once.
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from lobstr_hw.drivers.lighthouse.timed_poses import TimedPoses, timed_poses
 from lobstr_hw.drivers.lighthouse.tracker import (
     PoseBatch,
     TrackerSettings,
+    TrackerState,
     begin,
     join_poses,
     step,
@@ -89,8 +91,7 @@ class TrackedDevice:
             same_world: what was tracked so far is still true.
         """
         self._stations = stations
-        if not same_world:
-            self._state = begin()
+        self._state = _without_others(self._state, stations) if same_world else begin()
 
     def feed(self, report: bytes) -> None:
         """The next input report; what is no report of such a device is left alone."""
@@ -127,6 +128,12 @@ class TrackedDevice:
         """What was found since the last call, oldest first."""
         given, self._given = self._given, []
         return timed_poses(join_poses(given), self.model)
+
+
+def _without_others(state: TrackerState, stations: Stations) -> TrackerState:
+    """Hits that wait to be used are those of these stations, too."""
+    keep = np.isin(state.angles.station, list(stations))
+    return replace(state, angles=take_angles(state.angles, keep))
 
 
 def _pieces(decoded: Decoded) -> Iterator[Decoded]:

@@ -117,6 +117,24 @@ def test_stations_can_be_told_later_and_taken_away() -> None:
     assert not given[2].tracked.any()
 
 
+@pytest.mark.parametrize("left", [{0, 1}, {0, 2}, {1, 2}, {2}, set()])
+def test_stations_can_be_taken_away_while_their_light_waits_to_be_used(left: set[int]) -> None:
+    model, stations = device(), room(2, count=3)
+    kept = {n: s for n, s in stations.items() if n in left}
+    motion = carried(4)
+    reports = reports_of(stations, model, motion, 1.0)
+    found = TrackedDevice(model, stations)
+    for k, report in enumerate(reports):
+        if k == len(reports) // 2:
+            found.use_stations(kept)
+        found.feed(report.data)
+    poses = found.poses()
+    assert poses.tracked[-1] == bool(left)
+    off = np.linalg.norm(poses.p - motion.p(at(poses)), axis=1)
+    settled = poses.tracked & (at(poses) > 0.5)
+    assert not settled.any() or off[settled].max() < 0.02
+
+
 def test_a_whole_recording_of_events_gives_poses_too() -> None:
     model, motion = device(), carried(5)
     whole, fed = TrackedDevice(model, room(2)), TrackedDevice(model, room(2))
