@@ -5,7 +5,7 @@ wait for a device ─► ask what it is ─► follow it ─► unplugged: the e
 └────────── switched off, or silent ─────────────────┘
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from threading import Event, Thread
 
@@ -61,6 +61,7 @@ class DeviceSession:
         gen2: bool,
         put: Callable[[News], None],
         told: set[str],
+        numbers: Iterator[int],
     ) -> None:
         """Start.
 
@@ -70,6 +71,7 @@ class DeviceSession:
             gen2: the light mode to begin with.
             put: takes what happens, from another thread.
             told: words that were said already; is added to.
+            numbers: for naming its clock: one each time that it is switched on, given to no other.
         """
         self.device = device
         self.about: About | None = None
@@ -80,8 +82,8 @@ class DeviceSession:
         self._stations = (stations, True)
         self._gen2, self._put = gen2, put
         self._stop = Event()
-        self._nth = self._refused = 0
-        self._told = told
+        self._refused = 0
+        self._told, self._numbers = told, numbers
         name = f"lobstr-{device.info.key}"
         self._thread = Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
@@ -167,8 +169,8 @@ class DeviceSession:
         stations, _ = self._stations
         tracked = TrackedDevice(about.model, stations, about.ranges, reader)
         self.sight, self.tracked = Sight(len(about.model.points)), tracked
-        follower = DeviceFollower(tracked, about, self.sight, f"{self.device.info.key}/{self._nth}")
-        self._nth += 1
+        clock = f"{self.device.info.key}/{next(self._numbers)}"
+        follower = DeviceFollower(tracked, about, self.sight, clock)
         silent = 0
         while not (self._stop.is_set() or reader.gone or (by_radio and silent > SILENT_READS)):
             report = self.device.read(READ_S)

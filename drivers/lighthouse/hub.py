@@ -8,6 +8,7 @@ readings go on, what concerns the base stations goes to their desk.
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Event, Lock, Thread
@@ -75,6 +76,7 @@ class Hub:
         self._refused: dict[str, DriverError] = {}
         self._desk = StationDesk(stations, self._tell, self._stations_changed)
         self._told: set[str] = set()
+        self._numbers = count()  # of a device's clocks: what is plugged in anew has another one
         self._looking = Thread(target=self._look_again, name="lobstr-plugs", daemon=True)
         self._look()
         if not self._sessions:
@@ -189,5 +191,5 @@ class Hub:
             stations = self._desk.stations
             gen2 = any(s.calibration.generation == 2 for s in stations.values())
             self._sessions[info.key] = DeviceSession(
-                device, stations, gen2, self._inbox.put, self._told
+                device, stations, gen2, self._inbox.put, self._told, self._numbers
             )

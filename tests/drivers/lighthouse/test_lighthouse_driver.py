@@ -317,6 +317,23 @@ def test_devices_come_and_go_by_themselves(clock: FakeClock, station_file: Path)
         assert EventKind.BACK in {e.kind for e in driver.events() if e.serial == TRACKER.serial}
 
 
+def test_after_a_return_times_go_on_from_sample_to_sample(
+    clock: FakeClock, station_file: Path
+) -> None:
+    bench = Bench(one(carried(1), 1.0), clock, lambda usb: LighthouseDriver(station_file, usb))
+    [device] = bench.devices
+    with bench.driver:
+        bench.run_to(0.4)
+        device.unplug()
+        wait_until(lambda: device.opened == 0, "it is let go of")
+        bench.run_to(1.0)
+        device.plug()
+        wait_until(lambda: device.opened == 1, "it is opened again")
+        times = [s.time_s for s in bench.run_to(1.8) if s.tracked and s.time_s > 0.5]
+    assert len(times) > 100
+    np.testing.assert_allclose(np.diff(times), 0.004, atol=1e-6)
+
+
 def cable(kind: int, at: int, value: bytes) -> bytes:
     return (bytes([1, 0, kind]).ljust(at, b"\0") + value).ljust(64, b"\0")
 
