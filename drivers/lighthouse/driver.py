@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from lobstr_hw.drivers.chosen_roles import ROLE_OPTIONS, by_serial, hint
-from lobstr_hw.drivers.driver import BASE_STATION, DeviceInfo, Probe
+from lobstr_hw.drivers.driver import BASE_STATION, DeviceEvent, DeviceInfo, EventKind, Probe
 from lobstr_hw.drivers.lighthouse.hub import DeviceAbout, Hub
 from lobstr_hw.drivers.lighthouse.raw_recording import RawRecording
 from lobstr_hw.drivers.lighthouse.steamvr import steamvr_runs
@@ -64,6 +64,7 @@ class LighthouseDriver(StreamDriver):
         self._path, self._chosen_transport = stations, transport
         self._raw_path = raw
         self._raw: RawRecording | None = None
+        self._raw_problem = ""
         self._chosen = by_serial(serials)
         self._hub: Hub | None = None
         self._infos: dict[str, DeviceInfo] = {}
@@ -95,13 +96,22 @@ class LighthouseDriver(StreamDriver):
             raise
         return self._hub
 
+    def events(self) -> Sequence[DeviceEvent]:
+        """As of every stream; and once, that the capture ended early."""
+        events = super().events()
+        problem = "" if self._raw is None else self._raw.problem
+        if problem == self._raw_problem:
+            return events
+        self._raw_problem = problem
+        return (*events, DeviceEvent(EventKind.NOTICE, "", self._last_s, problem))
+
     def close(self) -> None:
         """Release the devices, and finish the capture."""
         super().close()
         self._end_raw()
 
     def _end_raw(self) -> None:
-        raw, self._raw = self._raw, None
+        raw, self._raw, self._raw_problem = self._raw, None, ""
         if raw is not None:
             raw.close()
 

@@ -73,6 +73,11 @@ class RawRecording:
         now_s = time.perf_counter() if at_s is None else at_s
         self._writer.add(UsbReport(device, self._unix_s + now_s, kind, endpoint, data))
 
+    @property
+    def problem(self) -> str:
+        """What ended the file early, and what to do, or empty."""
+        return self._writer.problem
+
     def close(self) -> None:
         """Finish the file; devices may still be read, unrecorded."""
         self._writer.close()

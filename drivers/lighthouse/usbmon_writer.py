@@ -4,6 +4,7 @@ The bytes stand in usbmon.py. A report that was asked for becomes a request and 
 """
 
 import struct
+from contextlib import suppress
 from pathlib import Path
 from threading import Lock
 
@@ -32,7 +33,11 @@ MICRO = 1_000_000
 
 
 class UsbmonWriter:
-    """Appends to a capture; may be used by several threads."""
+    """Appends to a capture; may be used by several threads.
+
+    Attributes:
+        problem: what ended the file early, and what to do, or empty.
+    """
 
     def __init__(self, path: Path) -> None:
         """Begin the file.
@@ -40,6 +45,7 @@ class UsbmonWriter:
         Raises:
             OutputError: it cannot be written.
         """
+        self._path, self.problem = path, ""
         try:
             self._file = path.open("wb")
         except OSError as error:
@@ -49,21 +55,37 @@ class UsbmonWriter:
             ) from error
         self._lock = Lock()
         self._requests = 0
+        self._bytes = len(FILE_HEADER)
         self._file.write(FILE_HEADER)
 
     def add(self, report: UsbReport) -> None:
-        """The next report; nothing more once the file is closed."""
+        """The next report; nothing more once the file is closed, or the disk is full."""
         with self._lock:
             if self._file.closed:
                 return
             self._requests += 1
-            for packet in _packets(report, self._requests):
-                self._file.write(packet)
+            try:
+                for packet in _packets(report, self._requests):
+                    self._file.write(packet)
+                    self._bytes += len(packet)
+            except OSError as error:
+                self._give_up(error)
 
     def close(self) -> None:
-        """Finish; twice is harmless."""
+        """Finish; twice is harmless; never raises."""
         with self._lock:
+            try:
+                self._file.close()
+            except OSError as error:
+                self._give_up(error)
+
+    def _give_up(self, error: OSError) -> None:
+        with suppress(OSError):
             self._file.close()
+        self.problem = self.problem or (
+            f"{self._path}: the recording of what went over USB ended after "
+            f"{self._bytes / 1e6:.1f} MB ({error.strerror or error}). Free space and record again."
+        )
 
 
 def _packets(report: UsbReport, request: int) -> list[bytes]:

@@ -21,7 +21,7 @@ from lobstr_hw.drivers.lighthouse.usb_report import ReportKind, UsbReport
 from lobstr_hw.drivers.lighthouse.usbmon import read_usbmon
 from lobstr_hw.drivers.lighthouse.usbmon_writer import UsbmonWriter
 from lobstr_hw.errors import DriverUnavailable, OutputError
-from lobstr_hw.trackers import TrackerSample
+from lobstr_hw.trackers import TrackerSample, TrackingState
 
 SECONDS = 0.6
 
@@ -98,6 +98,34 @@ def test_a_folder_that_is_missing_is_told(tmp_path: Path) -> None:
     path = tmp_path / "none" / "a.pcap"
     with pytest.raises(OutputError, match="make this one first"):
         UsbmonWriter(path)
+
+
+FULL = Path("/dev/full")
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="a disk that is always full is Linux's")
+def test_a_full_disk_ends_the_capture_is_told_once_and_stops_no_device(
+    stations_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, clock = named("LHR-0000000A"), FakeClock()
+    for module in (stream, reading_thread):
+        monkeypatch.setattr(module, "perf_counter", clock.now_s)
+    script = scripted_device(model, reports_of(room(2), model, carried(1), SECONDS))
+    bench = Bench([script], clock, lambda t: LighthouseDriver(stations_file, t, FULL))
+    with bench.driver:
+        samples = bench.run_to(clock.now_s() + SECONDS, 0.1)
+        assert ["Free space" in words for words in bench.words()] == [True]
+        assert not bench.words()
+    assert samples[-1].tracked
+    assert not [s for s in samples if s.state is TrackingState.GONE]
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="a disk that is always full is Linux's")
+def test_a_disk_that_is_full_at_the_end_is_no_error_of_closing() -> None:
+    writer = UsbmonWriter(FULL)
+    writer.close()
+    writer.close()
+    assert "Free space" in writer.problem
 
 
 def test_a_capture_that_cannot_be_written_leaves_no_device_open(
