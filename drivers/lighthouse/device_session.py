@@ -79,7 +79,7 @@ class DeviceSession:
         self.sight: Sight | None = None
         self.settled, self.ended = Event(), Event()
         self.surveyed = False
-        self._stations = (stations, True)
+        self._stations = self._used = (stations, 0)  # and the number of their world
         self._gen2, self._put = gen2, put
         self._stop = Event()
         self._refused = 0
@@ -89,8 +89,9 @@ class DeviceSession:
         self._thread.start()
 
     def use_stations(self, stations: Stations, same_world: bool) -> None:
-        """Be tracked by others from now on."""
-        self._stations = (stations, same_world and self._stations[1])
+        """Be tracked by others from now on; from one thread only."""
+        _, world = self._stations
+        self._stations = (stations, world if same_world else world + 1)
 
     def close(self) -> None:
         """End; the device is let go of."""
@@ -166,8 +167,8 @@ class DeviceSession:
         by_radio = self.device.info.kind is DeviceKind.DONGLE
         old_radio = by_radio and about.model.product_id in OLD_RADIO
         reader = DeviceReader(old_radio, about.mode.gen2 and by_radio)
-        stations, _ = self._stations
-        tracked = TrackedDevice(about.model, stations, about.ranges, reader)
+        self._used = self._stations
+        tracked = TrackedDevice(about.model, self._used[0], about.ranges, reader)
         self.sight, self.tracked = Sight(len(about.model.points)), tracked
         clock = f"{self.device.info.key}/{next(self._numbers)}"
         follower = DeviceFollower(tracked, about, self.sight, clock)
@@ -187,10 +188,11 @@ class DeviceSession:
         self._lose()
 
     def _obey(self, tracked: TrackedDevice) -> None:
-        stations, same_world = self._stations
-        if tracked.stations is not stations:
-            self._stations = (stations, True)
-            tracked.use_stations(stations, same_world)
+        """Use the newest stations; others may be named meanwhile, so nothing is written back."""
+        before, self._used = self._used, self._stations
+        if self._used is not before:
+            stations, world = self._used
+            tracked.use_stations(stations, same_world=world == before[1])
 
     def _switch_light(self, gen2: bool, reader: DeviceReader) -> None:
         with suppress(NoAnswer):

@@ -334,6 +334,29 @@ def test_after_a_return_times_go_on_from_sample_to_sample(
     np.testing.assert_allclose(np.diff(times), 0.004, atol=1e-6)
 
 
+def test_of_stations_that_are_named_one_after_the_other_the_newest_hold(
+    clock: FakeClock, station_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where the second are named while the session takes up the first."""
+    newest, used = dict(STATIONS), list[tuple[Any, bool]]()
+    bench = Bench(one(carried(1), 0.6), clock, lambda usb: LighthouseDriver(station_file, usb))
+
+    def name_more(self: TrackedDevice, stations: Any, same_world: bool = True) -> None:
+        used.append((stations, same_world))
+        if stations is not newest:
+            session.use_stations(newest, True)
+
+    monkeypatch.setattr(TrackedDevice, "use_stations", name_more)
+    with bench.driver as driver:
+        bench.run_to(0.2)
+        assert driver._hub is not None
+        [session] = driver._hub._open()
+        first = dict(STATIONS)
+        session.use_stations(first, False)
+        bench.run_to(0.4)
+    assert [(stations is newest, same) for stations, same in used] == [(False, False), (True, True)]
+
+
 def cable(kind: int, at: int, value: bytes) -> bytes:
     return (bytes([1, 0, kind]).ljust(at, b"\0") + value).ljust(64, b"\0")
 
