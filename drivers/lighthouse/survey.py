@@ -104,10 +104,12 @@ class Survey:
         seen = [stations for take in self._takes.values() for stations in take.seen]
         if self.known and len(seen) >= ALONE and not any(s & set(self.known) for s in seen):
             self.known = {}  # switched off, or in another room
-        self._say_progress(seen)
-        if len(seen) < self._next or self._lacks(seen):
+        # takes keep a minute each: what they hold stops growing, what went through them does not
+        moved = sum(take.moved for take in self._takes.values())
+        self._say_progress(moved, seen)
+        if moved < self._next or self._lacks(seen):
             return None
-        self._next = len(seen) + MORE
+        self._next = moved + MORE
         takes = [take.take() for take in self._takes.values() if take.seen]
         self._tell("Working out where the base stations stand.")
         return SolveRequest(takes, {**self.known, **self.wanted})
@@ -134,13 +136,12 @@ class Survey:
         self._said_carry = True
         self._tell(CARRY)
 
-    def _say_progress(self, seen: Sequence[frozenset[int]]) -> None:
-        if self.known or not self._said_carry or len(seen) < self._told + TOLD_EVERY:
+    def _say_progress(self, moved: int, seen: Sequence[frozenset[int]]) -> None:
+        if self.known or not self._said_carry or moved < self._told + TOLD_EVERY:
             return
-        self._told = len(seen)
+        self._told = moved
         lacks = self._lacks(seen)
-        self._tell(f"{len(seen)} moments seen. {lacks[:1].upper()}{lacks[1:]}" if lacks else
-                   f"{len(seen)} moments seen.")  # fmt: skip
+        self._tell(f"{moved} moments seen. {lacks[:1].upper()}{lacks[1:]}".rstrip())
 
     def _lacks(self, seen: Sequence[frozenset[int]]) -> str:
         """What has not been seen often enough."""

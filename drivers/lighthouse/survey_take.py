@@ -39,7 +39,11 @@ class _Chunk:
 
 
 class SurveyTake:
-    """Collects one device's light."""
+    """Collects one device's light.
+
+    Attributes:
+        moved: quarters of a second of moving so far, also those that are kept no longer.
+    """
 
     def __init__(self, model: DeviceModel) -> None:
         """Nothing was seen."""
@@ -49,7 +53,7 @@ class SurveyTake:
         self._chunks: deque[_Chunk] = deque(maxlen=MOST_CHUNKS)
         self._offset = 0
         self._newest: int | None = None
-        self._rests = 0
+        self._rests = self.moved = 0
 
     def add(self, decoded: Decoded) -> bool:
         """The next batch of the device; True: something was kept."""
@@ -94,6 +98,7 @@ class SurveyTake:
             since = int(imu.ticks[0]) + self._offset - self._newest
             self._offset += 0 if 0 < since <= PAUSE else PAUSE - since
         self._newest = int(imu.ticks[-1]) + self._offset
+        self.moved += moving
         self._chunks.append(
             _Chunk(
                 replace(imu, ticks=imu.ticks + self._offset),

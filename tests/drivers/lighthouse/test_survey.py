@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from support.lighthouse_devices import named
 from support.lighthouse_room import Motion, carried, imu_of, light_of, room, still
 
-from lobstr_hw.drivers.lighthouse import station_desk
+from lobstr_hw.drivers.lighthouse import station_desk, survey_take
 from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Angles, ImuSamples
 from lobstr_hw.drivers.lighthouse.decoding import Decoded
 from lobstr_hw.drivers.lighthouse.keep_known import keep_known
@@ -159,6 +159,22 @@ def test_a_solve_that_is_not_good_is_told_and_tried_again(
     home.carry(8.0, seed=4)
     assert home.desk.stations.keys() == {0, 1}
     assert len(home.solves) >= 2
+
+
+def test_after_any_number_of_failures_it_tries_again(
+    make_room: MakeRoom, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also when a take is full, and holds no more than at the try before."""
+    monkeypatch.setattr(survey_take, "MOST_CHUNKS", 56)
+    home = make_room(None, STATIONS)
+    home.hear()
+    home.answer = lambda solution: replace(solution, up_sigma_rad=0.05)
+    home.carry(20.0)
+    tries, words = len(home.solves), len(home.said)
+    assert tries > 1
+    home.carry(8.0, seed=4)
+    assert len(home.solves) > tries
+    assert any("moments" in w for w in home.said[words:])
 
 
 def test_what_the_solver_cannot_do_is_told(make_room: MakeRoom) -> None:
