@@ -1,6 +1,6 @@
 """The play space is set up anew in the middle of a session."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
@@ -180,3 +180,111 @@ def test_the_moment_is_found_among_several_samples_of_a_tick() -> None:
     assert since_s == 1.02
     assert geodesic_angle(T.R, T_NEW_OLD.R) < 1e-9
     assert watch.add(1.04, say([1.03, 1.04], 0.0), recentred=False) is Shift.NONE, "once"
+    assert watch.add(1.06, say([1.05, 1.06], 0.0), recentred=True) is Shift.NONE, "the word twice"
+    assert watch.add(1.42, say([1.41, 1.42], 0.0), recentred=False) is Shift.NONE
+
+
+# trackers that speak at different times, and move
+
+PLACES = {
+    TrackerRole.HEAD: np.array([0.1, 1.7, 0.2]),
+    TrackerRole.LEFT_HAND: np.array([0.5, 1.2, 0.4]),
+    TrackerRole.RIGHT_HAND: np.array([-0.5, 1.2, 0.4]),
+    TrackerRole.PELVIS: np.array([0.1, 1.0, 0.2]),
+}
+EVERY_S = 1.0 / 90.0
+SHIFT_S, WORD_S, END_S = 1.0, 1.05, 1.6
+
+
+def heard(
+    T: Pose,
+    staying: Sequence[TrackerRole] = (),
+    every_s: Mapping[TrackerRole, float] = {},
+    phase_s: float = 0.0,
+    hidden_s: Mapping[TrackerRole, tuple[float, float]] = {},
+    hand_m_s: float = 0.0,
+) -> list[Pose | Shift]:
+    """What a watch at 45 Hz says of a recentring, but NONE.
+
+    Args:
+        T: from the old space to the new one.
+        staying: trackers of another system.
+        every_s: between two samples; 1/90 where nothing is said.
+        phase_s: of the samples.
+        hidden_s: from when to when a tracker is out of sight.
+        hand_m_s: the right hand's speed.
+    """
+    samples = []
+    for role, place in PLACES.items():
+        step_s = every_s.get(role, EVERY_S)
+        for time_s in np.arange(0.5 + phase_s * step_s, END_S, step_s).tolist():
+            way = hand_m_s * (time_s - SHIFT_S) if role is TrackerRole.RIGHT_HAND else 0.0
+            pose = Pose(np.eye(3), place + np.array([0.0, 0.0, way]))
+            now = T @ pose if time_s >= SHIFT_S and role not in staying else pose
+            begin_s, end_s = hidden_s.get(role, (np.inf, np.inf))
+            seen = not begin_s <= time_s < end_s
+            samples.append(TrackerSample(str(role), PartialPose(now.R, now.p), time_s, seen))
+    samples.sort(key=lambda sample: sample.time_s)
+    watch, said, done = ShiftWatch(lambda serial: TrackerRole(serial)), list[Pose | Shift](), 0
+    for now_s in np.arange(0.5, END_S, 1.0 / 45.0).tolist():
+        begin, done = done, sum(sample.time_s <= now_s for sample in samples)
+        found = watch.add(now_s, samples[begin:done], 0.0 <= now_s - WORD_S < 1.0 / 45.0)
+        if isinstance(found, Shift):
+            said += [found] if found is not Shift.NONE else []
+        else:
+            said.append(found[0])
+    return said
+
+
+SIDE = Pose(rotation_y(0.6), np.array([0.8, 0.0, -0.3]))
+RATES_HZ = (30.0, 60.0, 90.0, 250.0)
+PHASES = (0.0, 0.35, 0.7)
+
+
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+@pytest.mark.parametrize("phase", PHASES)
+def test_a_pelvis_of_another_system_stays_behind_at_any_rate(rate_hz: float, phase: float) -> None:
+    rates = {TrackerRole.PELVIS: 1.0 / rate_hz}
+    assert heard(SIDE, [TrackerRole.PELVIS], rates, phase) == [Shift.APART]
+
+
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+@pytest.mark.parametrize("phase", PHASES)
+def test_the_shift_is_the_same_at_any_rate(rate_hz: float, phase: float) -> None:
+    (T,) = heard(SIDE, (), {TrackerRole.PELVIS: 1.0 / rate_hz}, phase)
+    assert isinstance(T, Pose)
+    np.testing.assert_allclose(T.p, SIDE.p, atol=1e-9)
+    assert geodesic_angle(T.R, SIDE.R) < 1e-9
+
+
+@pytest.mark.parametrize("begin_s", [0.9, 0.97, 0.995])
+def test_a_tracker_out_of_sight_for_a_moment_is_waited_for(begin_s: float) -> None:
+    hidden = {TrackerRole.PELVIS: (begin_s, 1.09)}
+    assert heard(SIDE, [TrackerRole.PELVIS], hidden_s=hidden) == [Shift.APART]
+    (T,) = heard(SIDE, hidden_s=hidden)
+    assert isinstance(T, Pose)
+    np.testing.assert_allclose(T.p, SIDE.p, atol=1e-9)
+
+
+def test_a_hand_may_move_on_while_it_is_out_of_sight() -> None:
+    (T,) = heard(SIDE, hidden_s={TrackerRole.RIGHT_HAND: (0.85, 1.09)}, hand_m_s=1.5)
+    assert isinstance(T, Pose)
+    np.testing.assert_allclose(T.p, SIDE.p, atol=1e-9)
+
+
+def test_a_tracker_that_went_out_of_sight_holds_nothing_up() -> None:
+    (T,) = heard(SIDE, hidden_s={TrackerRole.LEFT_HAND: (0.95, 9.0)})
+    assert isinstance(T, Pose)
+
+
+@pytest.mark.parametrize("speed_m_s", [1.0, 3.0, 5.0, 6.0, 8.0, 10.0])
+@pytest.mark.parametrize("rate_hz", [45.0, 90.0])
+def test_a_quick_hand_is_no_new_play_space(speed_m_s: float, rate_hz: float) -> None:
+    rates = dict.fromkeys(PLACES, 1.0 / rate_hz)
+    assert heard(Pose.identity(), (), rates, 0.5, hand_m_s=speed_m_s) == []
+
+
+def test_a_hand_that_jumps_by_itself_is_no_shift_of_all() -> None:
+    T = Pose(np.eye(3), np.array([0.0, 0.12, 0.0]))
+    others = [role for role in PLACES if role is not TrackerRole.RIGHT_HAND]
+    assert heard(T, others) == [Shift.APART]
