@@ -20,7 +20,7 @@ looked at: who leans out of the shoulder reaches farther than the arm is long.""
 
 
 class SlipWatch:
-    """Shown the samples of every tick; says each thing once."""
+    """Shown the samples of every tick; says each thing to do once per calibration."""
 
     def __init__(self) -> None:
         """Nothing is wrong."""
@@ -28,6 +28,7 @@ class SlipWatch:
         self._next_s = 0.0
         self._wrong: Counter[str] = Counter()
         self._told: set[str] = set()
+        self._aim: Calibration | None = None
 
     def add(
         self, now_s: float, samples: Sequence[TrackerSample], calibration: Calibration
@@ -37,8 +38,13 @@ class SlipWatch:
         Args:
             now_s: the time of this tick.
             samples: new ones, oldest first.
-            calibration: in use.
+            calibration: in use; with another one all begins anew.
         """
+        if calibration is not self._aim:
+            self._aim = calibration
+            self._samples.clear()
+            self._wrong.clear()
+            self._told.clear()
         if now_s < self._next_s - LOOK_S:
             return []
         self._samples.extend(samples)
@@ -60,8 +66,8 @@ class SlipWatch:
             if needed is None:
                 continue
             self._wrong[one.name] = 0 if one.ok else self._wrong[one.name] + 1
-            if self._wrong[one.name] >= needed and not self._told:
-                self._told.add(one.name)
+            if self._wrong[one.name] >= needed and one.advice not in self._told:
+                self._told.add(one.advice)
                 said.append(_warning(one))
         return said
 

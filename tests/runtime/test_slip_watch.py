@@ -117,3 +117,27 @@ def test_one_look_that_is_right_begins_the_count_anew(
     # every third look falls on a moment in which all is right
     mixed = [(right if int(a.time_s / EVERY_S) % 3 == 0 else wrong)[i] for i, a in enumerate(wrong)]
     assert list(watched(SlipWatch(), mixed, profile)) == []
+
+
+def test_a_warning_of_one_thing_hides_no_other(whole: SimulatedTake, profile: Calibration) -> None:
+    low = take_of(at_ease(14.0), strapped(whole.user, (0.0, -0.06, 0.0), (0.0, 0.0, 0.0)))
+    turned = take_of(at_ease(40.0), strapped(whole.user, (0.0, 0.0, 0.0), (0.0, 0.6, 0.0)))
+    samples = list(take_samples(low))
+    samples += [replace(s, time_s=s.time_s + 14.0) for s in take_samples(turned)]
+    said = [text for _, text in watched(SlipWatch(), samples, profile)]
+    assert len(said) == len(set(said)) == 2
+    assert "look straight ahead" in said[1]
+
+
+def test_after_another_calibration_all_is_watched_anew(
+    whole: SimulatedTake, profile: Calibration
+) -> None:
+    slipped = strapped(whole.user, (0.0, -0.06, 0.0), (0.0, 0.0, 0.0))
+    samples = list(take_samples(take_of(at_ease(12.0), slipped)))
+    watch = SlipWatch()
+    assert len(list(watched(watch, samples, profile))) == 1
+    later = [replace(s, time_s=s.time_s + 12.0) for s in samples]
+    again = replace(profile, floor_m=profile.floor_m)
+    assert len(list(watched(watch, samples + later, profile))) == 0, "not twice"
+    later = [replace(s, time_s=s.time_s + 24.0) for s in samples]
+    assert len(list(watched(watch, samples + later, again))) == 1
