@@ -33,7 +33,7 @@ OUT = Path(__file__).parent.parent / "docs" / "pictures" / "foot_lock.png"
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path)
-    parser.add_argument("--part", choices=PARTS, default="validation")
+    parser.add_argument("--part", choices=PARTS, default="test")
     parser.add_argument("--predictor", default="lobstr")
     parser.add_argument("--out", type=Path, default=OUT)
     options = parser.parse_args()

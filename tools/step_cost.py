@@ -111,7 +111,8 @@ def _head(args: argparse.Namespace) -> str:
     return f"""{TITLE}
 
 `python tools/step_cost.py --seconds {args.seconds:g}`, {date}: a step's features, network and
-rotations, paced at 45 Hz, one thread of a shared two-core machine.
+rotations, paced at 45 Hz, one thread of a shared two-core machine. Features and rotations are the
+same for both; of the networks alone see Error against cost.
 """
 
 

@@ -119,7 +119,9 @@ def _recipe(details: dict[str, Any]) -> str:
     minutes = sum(data["minutes_by_set"].values())
     return (
         f"`lobstr-train DATA --out RUN --recipe two-way --seed {config['seed']}"
-        f"{' --everybody' if config.get('everybody') else ''}`: {details['architecture']} "
+        f"{' --everybody' if config.get('everybody') else ''} --steps {details['steps_done']}` "
+        f"comes nearest ({'made in parts, see below' if 'history' in details else 'made so'}): "
+        f"{details['architecture']} "
         f"({details['parameters']:,} parameters), {details['steps_done']:,} steps of "
         f"{config['batch']} chunks of {config['window']} frames, {minutes:.0f} minutes of motion, "
         f"{details['wall_s'] / 60.0:.0f} minutes on one thread of a busy two-core machine. "

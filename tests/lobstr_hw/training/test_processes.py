@@ -124,7 +124,9 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     split = {**parts, "train": ["made/walk_0"], "validation": ["made/walk_1"]}
     (root / "split.json").write_text(json.dumps(split), encoding="utf-8")
     small = {"steps": 2, "batch": 4, "window": 20, "hidden_size": 8, "validate_every": 1}
-    write_config(root / "config.json", recipe_config("carried", device="cpu", **small))
+    write_config(
+        root / "config.json", recipe_config("carried", device="cpu", schedule="decay", **small)
+    )
     return root
 
 
