@@ -169,9 +169,9 @@ def test_after_any_number_of_failures_it_tries_again(
     home = make_room(None, STATIONS)
     home.hear()
     home.answer = lambda solution: replace(solution, up_sigma_rad=0.05)
-    home.carry(20.0)
+    home.carry(16.0)
     tries, words = len(home.solves), len(home.said)
-    assert tries > 1
+    assert tries == 1
     home.carry(8.0, seed=4)
     assert len(home.solves) > tries
     assert any("moments" in w for w in home.said[words:])
