@@ -15,7 +15,11 @@ from lobstr_hw.drivers.lighthouse.raw_recording import RawRecording
 from lobstr_hw.drivers.lighthouse.steamvr import steamvr_runs
 from lobstr_hw.drivers.lighthouse.survey import station_name
 from lobstr_hw.drivers.lighthouse.transport import Transport
-from lobstr_hw.drivers.lighthouse.transports import available_transports, choose_transport
+from lobstr_hw.drivers.lighthouse.transports import (
+    available_transports,
+    check_name,
+    choose_transport,
+)
 from lobstr_hw.drivers.stream import StreamDriver
 from lobstr_hw.drivers.vendor import probe_library
 from lobstr_hw.errors import (
@@ -59,8 +63,13 @@ class LighthouseDriver(StreamDriver):
             transport: name of a way to USB, or one that is open to use; None: the best there is.
             raw: a capture to write of all that goes over USB, for ``lobstr-log import``.
             serials: the serial that stands for each role.
+
+        Raises:
+            ValueError: no way to USB has this name here.
         """
         super().__init__()
+        if isinstance(transport, str):
+            check_name(transport)
         self._path, self._chosen_transport = stations, transport
         self._raw_path = raw
         self._raw: RawRecording | None = None

@@ -10,7 +10,13 @@ from lobstr_hw.drivers.lighthouse.pyusb_transport import PyusbTransport
 from lobstr_hw.drivers.lighthouse.transport import Transport
 from lobstr_hw.errors import DriverUnavailable
 
-__all__ = ["TRANSPORTS", "MissingTransport", "available_transports", "choose_transport"]
+__all__ = [
+    "TRANSPORTS",
+    "MissingTransport",
+    "available_transports",
+    "check_name",
+    "choose_transport",
+]
 
 TRANSPORTS: tuple[Transport, ...] = (
     # leaves the kernel's driver in place; Linux only
@@ -36,6 +42,16 @@ def available_transports() -> tuple[Sequence[Transport], Sequence[MissingTranspo
     return usable, [MissingTransport(t.name, p) for t, p in probes if not p.available]
 
 
+def check_name(name: str) -> None:
+    """Whether there is such a transport; whether it can be used is another question.
+
+    Raises:
+        ValueError: there is none of that name.
+    """
+    if name not in (known := [t.name for t in TRANSPORTS]):
+        raise ValueError(f"transport={name}: here there are {', '.join(known)}")
+
+
 def choose_transport(name: str | None = None) -> Transport:
     """The named transport, or the best one that there is.
 
@@ -44,8 +60,8 @@ def choose_transport(name: str | None = None) -> Transport:
         DriverUnavailable: it, or every one, misses something; the message says the cure.
     """
     usable, missing = available_transports()
-    if name is not None and name not in (known := [t.name for t in TRANSPORTS]):
-        raise ValueError(f"transport={name}: here there are {', '.join(known)}")
+    if name is not None:
+        check_name(name)
     for transport in usable:
         if name in (None, transport.name):
             return transport
