@@ -12,6 +12,8 @@ __all__ = ["LightMode"]
 ENOUGH = 20
 """Hits that prove a mode right: noise makes a few."""
 FIRST_TRY, LONGEST_TRY = 1 * TICKS_PER_S, 8 * TICKS_PER_S
+LONGEST_STEP = TICKS_PER_S // 10
+"""A longer one is a clock that began anew, as some do when the mode changes, or lost reports."""
 
 
 class LightMode:
@@ -31,8 +33,8 @@ class LightMode:
         """
         self.gen2 = gen2
         self._has_choice, self._tells = has_choice, tells
-        self._hits = 0
-        self._since: int | None = None
+        self._hits = self._tried = 0
+        self._newest: int | None = None
         # a cable's word for it is certain and comes at once; the other way there is none
         self._patience = LONGEST_TRY if tells else FIRST_TRY
 
@@ -44,13 +46,15 @@ class LightMode:
             hits: decoded since the last call.
             sees_gen2: the device said so.
         """
-        self._since = now if self._since is None else self._since
+        step = 0 if self._newest is None else now - self._newest
+        self._tried += min(max(step, 0), LONGEST_STEP)
+        self._newest = now
         self._hits += hits
         if not self._has_choice or self._hits >= ENOUGH:
             return False
         told = sees_gen2 and not self.gen2
-        tried = now - self._since > self._patience and (self.gen2 or not self._tells)
+        tried = self._tried > self._patience and (self.gen2 or not self._tells)
         if told or tried:
-            self.gen2, self._since, self._hits = not self.gen2, now, 0
+            self.gen2, self._tried, self._hits = not self.gen2, 0, 0
             self._patience = min(2 * self._patience, LONGEST_TRY)
         return told or tried

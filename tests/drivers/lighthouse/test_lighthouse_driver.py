@@ -21,7 +21,7 @@ from support.scripted_usb import ScriptedDevice
 from support.stream_contract import Sent, StreamDriverContract
 from support.waiting import wait_until
 
-from lobstr_hw.drivers import reading_thread, stream
+from lobstr_hw.drivers import load_driver, reading_thread, stream
 from lobstr_hw.drivers.driver import EventKind, TrackerDriver
 from lobstr_hw.drivers.lighthouse import device_session, hub, tracked_device
 from lobstr_hw.drivers.lighthouse import driver as driver_module
@@ -410,6 +410,11 @@ def test_where_nothing_is_plugged_in_or_all_is_taken_it_says_so(station_file: Pa
         LighthouseDriver(station_file, FakeTransport([taken])).open()
 
 
+def test_a_way_to_usb_that_does_not_exist_is_told_before_anything_is_opened() -> None:
+    with pytest.raises(ValueError, match=r"transport=foo: here there are .*pyusb"):
+        load_driver("lighthouse:transport=foo")
+
+
 def test_while_steamvr_runs_nothing_is_touched(
     station_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -456,6 +461,19 @@ def test_by_radio_one_mode_after_the_other_is_tried_until_light_makes_sense() ->
     was = mode.gen2
     assert not any(mode.switch(40 * S + k * S // 10, 3, False) for k in range(600))
     assert mode.gen2 is was
+
+
+@pytest.mark.parametrize("gap_s", [-30, 1, 20, 89])
+@pytest.mark.parametrize("tells", [False, True])
+def test_a_clock_that_jumps_when_the_mode_changes_is_no_wait_in_vain(
+    gap_s: int, tells: bool
+) -> None:
+    mode = LightMode(gen2=False, has_choice=True, tells=tells)
+    times = [40 * S + k * S // 10 for k in range(100)]
+    changed = next(t for t in times if mode.switch(t, 0, sees_gen2=t > 41 * S))
+    after = [changed + gap_s * S + k * S // 10 for k in range(8)]
+    assert not any(mode.switch(t, 0, False) for t in after), "light needs a moment to come"
+    assert mode.gen2
 
 
 def test_a_device_of_the_first_generation_is_left_in_its_mode() -> None:
