@@ -49,7 +49,8 @@ class StreamDriver(TrackerDriver):
 
     A device with a clock gives the samples' times (DeviceClock); of one without, a sample has the
     time at which the reading thread got it. Times of one clock never go back; trackers with clocks
-    of their own may be told later one than the other.
+    of their own may be told later one than the other. A word without a pose, such as a button, has
+    its place among the events and moves no sample.
     """
 
     def __init__(self) -> None:
@@ -130,6 +131,8 @@ class StreamDriver(TrackerDriver):
         """When it was measured: no later than it arrived, no earlier than what was given before."""
         if not isinstance(what, Reading):
             return max(self._last_s, arrived_s + self._lead_s)
+        if what.T_world_tracker is None and what.device_s is None:
+            return max(self._last_s, arrived_s + self._lead_s)
         measured_s, tracker = arrived_s, self._trackers.get(what.serial)
         if what.device_s is not None:
             measured_s = min(arrived_s, self._clocks[what.clock].host_s(what.device_s))
@@ -155,8 +158,9 @@ class StreamDriver(TrackerDriver):
 
     def _read(self, reading: Reading, arrived_s: float, time_s: float) -> list[TrackerSample]:
         tracker = self._trackers.setdefault(reading.serial, _Tracker())
-        tracker.arrived_s, tracker.last_s = arrived_s, time_s
-        self._given_s[reading.clock] = time_s
+        tracker.arrived_s = arrived_s
+        if reading.T_world_tracker is not None:
+            tracker.last_s = self._given_s[reading.clock] = time_s
         if tracker.gone:
             tracker.gone = False
             self._events.append(DeviceEvent(EventKind.BACK, reading.serial, time_s))

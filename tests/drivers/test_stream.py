@@ -245,6 +245,30 @@ def test_a_slow_tracker_keeps_its_times_beside_a_quick_one(bench: Bench) -> None
     assert late.time_s == pytest.approx(0.2), "its own time, though older than what was given"
 
 
+@given(st.lists(st.floats(0.0, 0.5), max_size=8))
+def test_a_button_without_a_pose_moves_no_sample(presses: list[float]) -> None:
+    """Poses of 12 ms come at once, a button when it is pressed."""
+
+    def times(pressed: list[float]) -> tuple[list[float], list[float]]:
+        with pytest.MonkeyPatch.context() as patched:
+            driver = Bench()
+            patched.setattr(stream, "ReadingThread", HandFed)
+            patched.setattr(stream, "perf_counter", lambda: driver.perf_s)
+            driver.open()
+            heard = [(0.012 * (k // 3 + 1), reading(7.0 + 0.004 * k)) for k in range(120)]
+            heard += [(t, replace(reading(buttons=frozenset({str(n)})), T_world_tracker=None))
+                      for n, t in enumerate(sorted(pressed))]  # fmt: skip
+            for at_s, what in sorted(heard, key=lambda pair: pair[0]):
+                driver.hear(at_s, what)
+            given = [s.time_s for k in range(60) for s in driver.at(k / 90)]
+            return given, [event.time_s for event in driver.events()]
+
+    told, events = times(presses)
+    assert told == times([])[0]
+    assert events == sorted(events)
+    assert len(events) == max(0, 2 * len(presses) - 1)
+
+
 def test_words_for_the_user_and_a_moved_origin_are_events(bench: Bench) -> None:
     bench.hear(0.1, Notice("a base station was moved"))
     bench.hear(0.2, Recentred())
