@@ -93,10 +93,14 @@ class DeviceSession:
         _, world = self._stations
         self._stations = (stations, world if same_world else world + 1)
 
-    def close(self) -> None:
-        """End; the device is let go of."""
+    def stop(self) -> None:
+        """Begin to end; waits for nothing."""
         self._stop.set()
-        self._thread.join(timeout=5.0)
+
+    def close(self, wait_s: float = 5.0) -> None:
+        """End; the device is let go of, as a rule within ``wait_s``."""
+        self.stop()
+        self._thread.join(timeout=wait_s)
 
     def _run(self) -> None:
         try:

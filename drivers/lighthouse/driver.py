@@ -24,7 +24,6 @@ from lobstr_hw.drivers.stream import StreamDriver
 from lobstr_hw.drivers.vendor import probe_library
 from lobstr_hw.errors import (
     DeviceBusy,
-    DriverError,
     DriverUnavailable,
     OutputError,
     StationFileError,
@@ -100,7 +99,7 @@ class LighthouseDriver(StreamDriver):
         except (StationFileError, OutputError) as error:
             self._end_raw()
             raise DriverUnavailable(str(error)) from error
-        except DriverError:
+        except BaseException:  # also Ctrl-C
             self._end_raw()
             raise
         return self._hub

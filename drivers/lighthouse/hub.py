@@ -12,6 +12,7 @@ from itertools import count
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Event, Lock, Thread
+from time import monotonic
 
 from lobstr_hw.drivers.lighthouse.angles import DeviceModel, StationCalibration
 from lobstr_hw.drivers.lighthouse.device_follower import Heard, News, Seen
@@ -28,8 +29,8 @@ __all__ = ["DeviceAbout", "Hub"]
 READ_S = 0.05
 LOOK_S = 1.0
 """Between two looks at what is plugged in: quick for a person; some milliseconds of work."""
-SETTLE_S = 3.0
-"""By then every device has said what it is, by cable or behind a dongle."""
+SETTLE_S, CLOSE_S = 3.0, 5.0
+"""By then every device has said what it is, by cable or behind a dongle; or is let go of."""
 NOT_FOUND = (
     "no Lighthouse device on USB. Plug in a headset, or a wand, tracker or Knuckles by cable, or "
     "the dongle of one that is switched on"
@@ -78,15 +79,15 @@ class Hub:
         self._told: set[str] = set()
         self._numbers = count()  # of a device's clocks: what is plugged in anew has another one
         self._looking = Thread(target=self._look_again, name="lobstr-plugs", daemon=True)
-        self._look()
-        if not self._sessions:
-            raise next(iter(self._refused.values()), TrackerNotFound(NOT_FOUND))
-        for error in self._refused.values():
-            self._tell(f"{error}; going on without it.")
         try:
+            self._look()
+            if not self._sessions:
+                raise next(iter(self._refused.values()), TrackerNotFound(NOT_FOUND))
+            for error in self._refused.values():
+                self._tell(f"{error}; going on without it.")
             self._settle()
             self._looking.start()
-        except BaseException:  # Ctrl-C while devices are asked
+        except BaseException:  # also Ctrl-C while devices are opened and asked
             self.close()
             raise
 
@@ -130,12 +131,15 @@ class Hub:
         return known | dict(self._desk.heard)
 
     def close(self) -> None:
-        """Let go of all devices; never raises."""
+        """Let go of all devices, of all at once; never raises."""
+        end_s = monotonic() + CLOSE_S
         self._stop.set()
-        if self._looking.is_alive():
-            self._looking.join(timeout=5.0)
         for session in self._open():
-            session.close()
+            session.stop()
+        if self._looking.is_alive():
+            self._looking.join(timeout=CLOSE_S)
+        for session in self._open():
+            session.close(max(0.0, end_s - monotonic()))
 
     def _open(self) -> list[DeviceSession]:
         with self._lock:
@@ -152,8 +156,9 @@ class Hub:
             self._inbox.put(Recentred())
 
     def _settle(self) -> None:
+        end_s = monotonic() + SETTLE_S
         for session in self._open():
-            session.settled.wait(SETTLE_S)
+            session.settled.wait(max(0.0, end_s - monotonic()))
 
     def _look_again(self) -> None:
         while not self._stop.wait(LOOK_S):

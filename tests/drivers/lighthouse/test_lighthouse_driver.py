@@ -2,7 +2,7 @@
 
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("scipy", reason="pip install 'lobstr-hw[lighthouse]'")
 
 from support.fake_clock import FakeClock
-from support.fake_transport import FakeTransport
+from support.fake_transport import FakeOpenDevice, FakeTransport
 from support.lighthouse_devices import Bench, HandedOut, named, scripted_device
 from support.lighthouse_room import Motion, carried, room, still
 from support.lighthouse_wire import TimedReport, reports_of
@@ -26,6 +26,7 @@ from lobstr_hw.drivers.driver import EventKind, TrackerDriver
 from lobstr_hw.drivers.lighthouse import device_session, hub, tracked_device
 from lobstr_hw.drivers.lighthouse import driver as driver_module
 from lobstr_hw.drivers.lighthouse.device_follower import About, DeviceFollower
+from lobstr_hw.drivers.lighthouse.device_session import DeviceSession
 from lobstr_hw.drivers.lighthouse.driver import LighthouseDriver
 from lobstr_hw.drivers.lighthouse.light_mode import LightMode
 from lobstr_hw.drivers.lighthouse.sight import Sight
@@ -33,7 +34,7 @@ from lobstr_hw.drivers.lighthouse.station_file import save_stations
 from lobstr_hw.drivers.lighthouse.steamvr import steamvr_runs
 from lobstr_hw.drivers.lighthouse.survey import FIRST_WORDS
 from lobstr_hw.drivers.lighthouse.tracked_device import TrackedDevice
-from lobstr_hw.drivers.lighthouse.transport import RawReport
+from lobstr_hw.drivers.lighthouse.transport import RawReport, UsbDeviceInfo
 from lobstr_hw.drivers.reading_thread import Reading
 from lobstr_hw.errors import DeviceBusy, DriverUnavailable, TrackerNotFound
 from lobstr_hw.trackers import TrackingState
@@ -413,6 +414,46 @@ def test_where_nothing_is_plugged_in_or_all_is_taken_it_says_so(station_file: Pa
 def test_a_way_to_usb_that_does_not_exist_is_told_before_anything_is_opened() -> None:
     with pytest.raises(ValueError, match=r"transport=foo: here there are .*pyusb"):
         load_driver("lighthouse:transport=foo")
+
+
+def test_ctrl_c_while_the_second_device_is_opened_leaves_none_open(
+    clock: FakeClock, station_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(
+        four(0.1), clock, lambda usb: LighthouseDriver(station_file, usb, tmp_path / "raw.pcap")
+    )
+    claim = bench.transport.open
+
+    def interrupted(info: UsbDeviceInfo) -> FakeOpenDevice:
+        if bench.devices[0].opened:
+            raise KeyboardInterrupt
+        return claim(info)
+
+    monkeypatch.setattr(bench.transport, "open", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        bench.driver.open()
+    assert not any(device.opened for device in bench.devices)
+    assert bench.driver._raw is None
+
+
+def test_all_devices_are_told_to_stop_before_any_is_waited_for(
+    clock: FakeClock, station_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    stop, close = DeviceSession.stop, DeviceSession.close
+
+    def noted(word: str, do: Callable[..., None]) -> Callable[..., None]:
+        def call(*args: Any) -> None:
+            told.append(word)
+            do(*args)
+
+        return call
+
+    bench = Bench(four(0.1), clock, lambda usb: LighthouseDriver(station_file, usb))
+    with bench.driver:
+        monkeypatch.setattr(DeviceSession, "stop", noted("stop", stop))
+        monkeypatch.setattr(DeviceSession, "close", noted("wait", close))
+    assert told[:5] == ["stop"] * 4 + ["wait"]
 
 
 def test_while_steamvr_runs_nothing_is_touched(
