@@ -6,11 +6,12 @@ import numpy as np
 
 from lobstr_hw.blend import blend
 from lobstr_hw.ik.vectors import smoothstep
+from lobstr_hw.poses import Pose
 from lobstr_hw.seated import Seat, sit
 from lobstr_hw.skeleton import Body
 from lobstr_hw.skeleton_pose import SkeletonPose, Source
 
-__all__ = ["Presentation"]
+__all__ = ["Presentation", "in_new_world"]
 
 BLEND_S = 0.5
 """Into a seat, out of it, and out of a frozen pose."""
@@ -47,9 +48,17 @@ class Presentation:
         self._leave()
         return self.seated
 
-    def forget_places(self) -> None:
-        """The world moved: feet on the floor and poses on the way are not where they were."""
-        self._seat = self._from = None
+    def shift_world(self, T_new_old: Pose) -> None:
+        """The play space was set up anew: what is shown stays where it is in the room.
+
+        Args:
+            T_new_old: of the user's world, heights over the floor left alone.
+        """
+        if self._seat is not None:
+            ankle, R_foot = T_new_old.apply(self._seat.ankle), T_new_old.R @ self._seat.R_foot
+            self._seat = replace(self._seat, ankle=ankle, R_foot=R_foot)
+        self._shown = None if self._shown is None else in_new_world(self._shown, T_new_old)
+        self._from = None if self._from is None else in_new_world(self._from, T_new_old)
 
     def _leave(self) -> None:
         """From the pose shown last into whatever comes."""
@@ -71,3 +80,10 @@ class Presentation:
             self._from = None if share >= 1.0 else self._from
         self._shown = pose
         return pose
+
+
+def in_new_world(pose: SkeletonPose, T_new_old: Pose) -> SkeletonPose:
+    """A body at the same place in the room, told in a world that lies elsewhere."""
+    R_local = pose.R_local.copy()
+    R_local[:, 0] = T_new_old.R @ R_local[:, 0]
+    return replace(pose, p_world=T_new_old.apply(pose.p_world), R_local=R_local)

@@ -14,7 +14,7 @@ from lobstr_hw.predictors.predictor import Frame, Predictor, State
 from lobstr_hw.rotations import Array
 from lobstr_hw.runtime.changing import Change
 from lobstr_hw.runtime.feed import Feed
-from lobstr_hw.runtime.presenting import Presentation
+from lobstr_hw.runtime.presenting import Presentation, in_new_world
 from lobstr_hw.runtime.standing import standing_pose
 from lobstr_hw.runtime.ticks import Tick
 from lobstr_hw.skeleton import Body
@@ -148,7 +148,9 @@ class Session:
         T = np.eye(4)[None]
         T[:, :3, :3], T[:, :3, 3] = T_new_old.R, T_new_old.p * LEVEL * self.calibration.scale
         self._state = self._avatar.shift_world(self._state, T)
-        self.presentation.forget_places()
+        level = Pose(T_new_old.R, T_new_old.p * LEVEL)
+        self.presentation.shift_world(level)
+        self._good = None if self._good is None else in_new_world(self._good, level)
 
     def _changed(self, now_s: float) -> Calibration | None:
         """The calibration at a time."""

@@ -33,9 +33,10 @@ class Recentred(FakeDriver):
         told_s: float | None = AT_S,
         roles: Sequence[TrackerRole] = FOUR_POINTS,
         script: str = "",
+        commands: Sequence[tuple[float, str]] = (),
     ) -> None:
         super().__init__(script=script)
-        self._T, self._word_s = T, told_s
+        self._T, self._word_s, self._commands = T, told_s, list(commands)
         self._serials = {SERIALS[role] for role in roles}
 
     def poll(self, now_s: float) -> Sequence[TrackerSample]:
@@ -45,6 +46,12 @@ class Recentred(FakeDriver):
         ]
 
     def events(self) -> Sequence[DeviceEvent]:
+        due = [command for command in self._commands if command[0] <= self._now_s]
+        self._commands = self._commands[len(due) :]
+        asked = [DeviceEvent(EventKind.COMMAND, "", time_s, name) for time_s, name in due]
+        return [*self._word(), *asked]
+
+    def _word(self) -> Sequence[DeviceEvent]:
         if self._word_s is None or self._now_s < self._word_s:
             return super().events()
         told, self._word_s = DeviceEvent(EventKind.RECENTRED, "", self._word_s), None
@@ -130,6 +137,16 @@ def test_trackers_that_stay_behind_are_told() -> None:
 def test_before_a_calibration_there_is_nothing_to_take_along() -> None:
     live, _, _ = played(Recentred(script="gestures", told_s=0.5), "standing")
     assert live.session.calibrated
+
+
+@pytest.mark.parametrize("command", ["freeze", "seat"])
+def test_a_frozen_or_seated_body_is_taken_along(command: str) -> None:
+    # on again at once: the way out of what is shown begins in the new space
+    commands = [(4.0, command), (4.5, command)]
+    _, still, _ = played(Recentred(Pose.identity(), commands=commands), "standing")
+    _, p, said = played(Recentred(commands=commands), "standing")
+    assert sum("body moved along" in spoken.text for spoken in said) == 1
+    assert np.linalg.norm(back(p, T_NEW_OLD) - still, axis=-1).max() < 0.01
 
 
 # the arithmetic
