@@ -52,11 +52,13 @@ class Recording:
         moments: one per tick.
         session: at the end of the log; calibrated.
         options: rate and delay it was played with.
+        damage: why the log ends early, or empty.
     """
 
     moments: tuple[Moment, ...]
     session: Session
     options: LiveOptions
+    damage: str = ""
 
     @property
     def body(self) -> Body:
@@ -114,7 +116,7 @@ def seen_in(path: Path, profile: Path | None, tell: Tell, step: Step) -> Recordi
                 step(tick.time_s, driver.duration_s)
         if not live.session.calibrated:
             raise live.watcher.failure()
-        return Recording(tuple(moments), live.session, options)
+        return Recording(tuple(moments), live.session, options, driver.log.damage)
 
 
 def refined_poses(

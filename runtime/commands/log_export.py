@@ -5,7 +5,7 @@ import csv
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 
@@ -82,9 +82,22 @@ def _export(options: argparse.Namespace) -> Report:
             with whole_file(target) as part:
                 output = _output(kind, part)
                 rows = _play(poses, bodies.body, bodies.rate_hz, output, step, len(bodies))
-    document = {"file": str(target), "kind": kind, "rows": rows, "damage": log.damage or None}
-    cut = f"; the log is cut: {log.damage}" if log.cut else ""
-    return Report(f"{target}: {rows} {'samples' if options.csv else 'frames'}{cut}", document)
+    return _report(target, kind, rows, log.damage)
+
+
+def _report(target: Path, kind: str, rows: int, damage: str, *, refined: bool = False) -> Report:
+    """What was written, and how far the log could be read."""
+    document: dict[str, Any] = {
+        "file": str(target),
+        "kind": kind,
+        "rows": rows,
+        "damage": damage or None,
+    }
+    text = f"{target}: {rows} {'samples' if kind == 'csv' else 'frames'}"
+    if refined:
+        document["refined"] = True
+        text += ", the legs refined"
+    return Report(text + (f"; the log is cut: {damage}" if damage else ""), document)
 
 
 def _csv_file(log: TrackerLog, part: Path, step: Step) -> int:
@@ -165,8 +178,7 @@ def _refine(options: argparse.Namespace) -> Report:
             step,
             len(recording.moments),
         )
-    document = {"file": str(target), "kind": kind, "rows": rows, "refined": True}
-    return Report(f"{target}: {rows} frames, the legs refined", document)
+    return _report(target, kind, rows, recording.damage, refined=True)
 
 
 def _tell(message: str) -> None:

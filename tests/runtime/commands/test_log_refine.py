@@ -63,6 +63,16 @@ def test_ndjson_and_the_report_agree_on_the_frames(
     assert report["rows"] == len(out.read_text(encoding="utf-8").splitlines())
 
 
+def test_a_cut_log_is_told(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cut, out = tmp_path / "cut.mcap", tmp_path / "out.ndjson"
+    cut.write_bytes(log.read_bytes()[:-50])
+    arguments = ["export", str(cut), "--ndjson", str(out), "--refine"]
+    assert lobstr_log(arguments) == 0
+    assert "the log is cut: the file ends in the middle" in capsys.readouterr().out
+    assert lobstr_log([*arguments, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["damage"] == "the file ends in the middle"
+
+
 def test_a_profile_can_be_given(log: Path, tmp_path: Path) -> None:
     profile, out = tmp_path / "me.json", tmp_path / "out.ndjson"
     calibration = seen_in(log, None, lambda _: None, lambda *_: None).session.aim
