@@ -81,7 +81,8 @@ class Controls:
             self._feed.shift(T_new_old, since_s)
             self._session.shift_world(T_new_old)
             self._lookout.world_moved(now_s)
-            self._say(Spoken("The play space was set up anew; the body moved along."))
+            if self._session.calibrated:
+                self._say(Spoken("The play space was set up anew; the body moved along."))
 
     def _obey(self, command: Command, now_s: float) -> Spoken:
         if not self._session.calibrated:

@@ -37,8 +37,24 @@ def chosen_profile(
         return _checked(load_profile(path), driver, tell)
     if isinstance(driver, ReplayDriver):
         data = driver.log.profile
-        return None if data is None else profile_from_json(data.decode(), f"{driver.path}: profile")
+        return None if data is None else _profile_of(data, driver)
     return _own_profile(default_profile_path(), driver, tell)
+
+
+def _profile_of(data: bytes, driver: ReplayDriver) -> Calibration:
+    """The profile in a log.
+
+    Raises:
+        ProfileError: it is none.
+    """
+    where = f"{driver.path}: profile"
+    try:
+        text = data.decode()
+    except UnicodeDecodeError as error:
+        raise ProfileError(
+            f"{where}: is no text ({error.reason}). Name another with --profile FILE."
+        ) from error
+    return profile_from_json(text, where)
 
 
 def _checked(
@@ -67,8 +83,8 @@ def _alone(profile: Calibration, driver: TrackerDriver) -> str:
     names = list(profile.tracking_spaces)
     return (
         f"The profile joins the tracking systems {' and '.join(names)}, and one alone is here. "
-        f"Name all of them: {' '.join(f'--driver {name}' for name in names)}; or calibrate for "
-        "this one: lobstr-calibrate."
+        "Name all of them with --driver, as at the calibration; or calibrate for this one: "
+        "lobstr-calibrate."
     )
 
 
@@ -100,8 +116,8 @@ def spaces_as_before(source: Path | ReplayDriver, world: str) -> Mapping[str, Tr
     """
     try:
         if isinstance(source, ReplayDriver):
-            text = source.log.profile
-            spaces = {} if text is None else profile_from_json(text.decode()).tracking_spaces
+            data = source.log.profile
+            spaces = {} if data is None else _profile_of(data, source).tracking_spaces
         else:
             spaces = load_profile(source).tracking_spaces
     except ProfileError:

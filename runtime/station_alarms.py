@@ -9,6 +9,7 @@ __all__ = ["StationAlarms"]
 
 HIDDEN_S = 5.0
 """Bodies hide a station from every tracker for a moment."""
+WHAT_TO_DO = "Is it switched on, and is nothing in front of it?"
 
 
 class StationAlarms:
@@ -28,7 +29,8 @@ class StationAlarms:
             if event.serial not in self._stations:
                 continue
             if event.kind is EventKind.GONE:
-                said.append(Spoken(f"Base station {event.serial} lost.", Sound.TROUBLE))
+                words = f"Base station {event.serial} lost. {WHAT_TO_DO}"
+                said.append(Spoken(words, Sound.TROUBLE))
             elif event.kind is EventKind.BACK:
                 said.append(Spoken(f"Base station {event.serial} is back.", Sound.DONE))
         return said
@@ -45,7 +47,8 @@ class StationAlarms:
         if self._told or now_s - self._fewer_since_s < HIDDEN_S:
             return []
         self._told = True
-        return [Spoken(f"Only {seen} of {self._most} base stations in sight.", Sound.TROUBLE)]
+        words = f"Only {seen} of {self._most} base stations in sight. {WHAT_TO_DO}"
+        return [Spoken(words, Sound.TROUBLE)]
 
     def _all_seen(self) -> list[Spoken]:
         self._fewer_since_s = None

@@ -68,9 +68,16 @@ def import_recordings(
         step: moves the progress bar.
 
     Raises:
-        FileFormatError: nothing to track in one of the files; says why.
+        FileFormatError: nothing to track in one of the files, or they have no common clock; says
+            why.
         StationsNotSolved: too little light.
     """
+    kinds = {recording_kind(path) for path in files}
+    if len(kinds) > 1:
+        raise FileFormatError(
+            "captures of USB say what time it was, libsurvive's text how long it ran: the two have "
+            "no time in common. Import each kind into a log of its own."
+        )
     model = None if config is None else _known_model(config)
     takes = []
     for done, path in enumerate(files):
@@ -85,7 +92,7 @@ def import_recordings(
         step(len(files) + 1 + done, what=f"following the devices of {of_file[0].path.name}")
         tracked += _placed(of_file, track_takes(of_file, stations), tracked)
     with whole_file(out) as part:
-        _write(part, tracked, recording_kind(files[0]) is RecordingKind.USB)
+        _write(part, tracked, kinds == {RecordingKind.USB})
     return _report(out, tracked, stations, residual)
 
 

@@ -4,18 +4,22 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.calibrations import calibrated
 from support.list_driver import ListDriver
 
 from lobstr_hw.calibration import Calibration, TrackingSpace, save_profile
+from lobstr_hw.drivers.replay import ReplayDriver
+from lobstr_hw.drivers.tracker_log import TrackerLogWriter
 from lobstr_hw.errors import ProfileError
+from lobstr_hw.poses import PartialPose
 from lobstr_hw.runtime.many_drivers import ManyDrivers
 from lobstr_hw.runtime.part_driver import PartDriver
 from lobstr_hw.runtime.profile_path import default_profile_path
 from lobstr_hw.runtime.profiles import chosen_profile, spaces_as_before
 from lobstr_hw.simulation import SimulatedTake
-from lobstr_hw.trackers import TrackerRole
+from lobstr_hw.trackers import TrackerRole, TrackerSample
 
 MIXED = {"openvr": TrackingSpace(), "polhemus": TrackingSpace(delay_s=0.01)}
 
@@ -53,7 +57,7 @@ def test_a_profile_of_two_systems_needs_both(profile: Calibration, tmp_path: Pat
         chosen(path, hints)
     message = str(caught.value)
     assert "joins the tracking systems openvr and polhemus" in message
-    assert "--driver openvr --driver polhemus" in message
+    assert "all of them with --driver, as at the calibration" in message
     assert "lobstr-calibrate" in message
 
 
@@ -114,3 +118,14 @@ def test_old_spaces_are_kept_only_for_the_same_world(profile: Calibration, tmp_p
     assert spaces_as_before(path, "vmc") == {}
     path.write_text("broken", encoding="utf-8")
     assert spaces_as_before(path, "openvr") == {}
+
+
+def test_a_profile_in_a_log_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "odd.mcap"
+    with TrackerLogWriter(path) as writer:
+        writer.attach_profile(b"\xff\xfe")
+        writer.add_sample(TrackerSample("A", PartialPose(np.eye(3), np.zeros(3)), 0.0, True))
+    with ReplayDriver(path) as driver:
+        with pytest.raises(ProfileError, match="--profile FILE"):
+            chosen_profile(None, driver, lambda _: None)
+        assert spaces_as_before(driver, "openvr") == {}

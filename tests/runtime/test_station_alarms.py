@@ -41,7 +41,9 @@ def test_a_station_that_nobody_sees_for_long_is_told_once_and_its_return_too() -
     alarms = StationAlarms()
     said = [alarms.devices(float(t), trackers(2, 1)) for t in range(3)]
     said += [alarms.devices(float(t), trackers(1, 1)) for t in range(3, 30)]
-    assert [text for one in said for text in words(one)] == ["Only 1 of 2 base stations in sight."]
+    assert [text for one in said for text in words(one)] == [
+        "Only 1 of 2 base stations in sight. Is it switched on, and is nothing in front of it?"
+    ]
     told_at = next(i for i, one in enumerate(said) if one)
     assert told_at >= 3 + HIDDEN_S
     assert words(alarms.devices(30.0, trackers(1, 2))) == ["All 2 base stations in sight again."]

@@ -135,8 +135,19 @@ def test_trackers_that_stay_behind_are_told() -> None:
 
 
 def test_before_a_calibration_there_is_nothing_to_take_along() -> None:
-    live, _, _ = played(Recentred(script="gestures", told_s=0.5), "standing")
+    live, _, said = played(Recentred(script="gestures", told_s=0.5), "standing")
     assert live.session.calibrated
+    assert not any("body moved along" in spoken.text for spoken in said)
+
+
+def test_while_nobody_is_calibrated_no_body_is_said_to_have_moved() -> None:
+    class Still(Recentred):
+        def poll(self, now_s: float) -> Sequence[TrackerSample]:
+            return [s for s in super().poll(now_s) if s.time_s > AT_S - 0.3]
+
+    live, _, said = played(Still(script="gestures"), "standing")
+    assert not live.session.calibrated
+    assert not any("body moved along" in spoken.text for spoken in said)
 
 
 @pytest.mark.parametrize("command", ["freeze", "seat"])

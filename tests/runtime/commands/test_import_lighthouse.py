@@ -138,3 +138,13 @@ def test_real_captures_that_show_too_little_say_so(
     folder: Path, name: str, why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert why in refused([folder / name, tmp_path / "out.mcap"], capsys)
+
+
+def test_recordings_without_a_common_clock_are_refused(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, out = tmp_path / "take.rec", tmp_path / "out.mcap"
+    text.write_text("0.01 WM0 CONFIG {}\n", encoding="utf-8")
+    assert main(["import", str(recording), str(text), "--output", str(out)]) == 1
+    assert "Import each kind into a log of its own" in capsys.readouterr().err
+    assert not out.exists()
