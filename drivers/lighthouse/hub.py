@@ -29,12 +29,18 @@ __all__ = ["DeviceAbout", "Hub"]
 READ_S = 0.05
 LOOK_S = 1.0
 """Between two looks at what is plugged in: quick for a person; some milliseconds of work."""
+SECOND_LOOK = 0.2
+"""Of that, until what is new is looked at again: interfaces and leave to use them come one by one,
+and only what two looks in a row found alike is opened."""
 SETTLE_S, CLOSE_S = 3.0, 5.0
 """By then every device has said what it is, by cable or behind a dongle; or is let go of."""
 NOT_FOUND = (
     "no Lighthouse device on USB. Plug in a headset, or a wand, tracker or Knuckles by cable, or "
     "the dongle of one that is switched on"
 )
+
+Listed = dict[str, UsbDeviceInfo]
+"""What is plugged in, by its key."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +86,8 @@ class Hub:
         self._numbers = count()  # of a device's clocks: what is plugged in anew has another one
         self._looking = Thread(target=self._look_again, name="lobstr-plugs", daemon=True)
         try:
-            self._look()
+            listed = self._listed()
+            self._open_new(listed, listed)
             if not self._sessions:
                 raise next(iter(self._refused.values()), TrackerNotFound(NOT_FOUND))
             for error in self._refused.values():
@@ -161,14 +168,22 @@ class Hub:
             session.settled.wait(max(0.0, end_s - monotonic()))
 
     def _look_again(self) -> None:
-        while not self._stop.wait(LOOK_S):
+        before: Listed = {}
+        wait_s = LOOK_S
+        while not self._stop.wait(wait_s):
+            wait_s = LOOK_S
             with suppress(DriverError, OSError):
-                for info in self._look():
+                listed = self._listed()
+                for info in self._open_new(listed, before):
                     self._tell(f"{self._refused[info.key]}; going on without it.")
+                wait_s *= 1.0 if listed == before else SECOND_LOOK
+                before = listed
 
-    def _look(self) -> list[UsbDeviceInfo]:
-        """Open what was plugged in; returns what could not be opened, each once."""
-        listed = {info.key: info for info in self._transport.enumerate()}
+    def _listed(self) -> Listed:
+        return {info.key: info for info in self._transport.enumerate()}
+
+    def _open_new(self, listed: Listed, before: Listed) -> list[UsbDeviceInfo]:
+        """Open what is new and listed as before; returns what could not be opened, each once."""
         for key in [key for key in self._refused if key not in listed]:
             del self._refused[key]
         with self._lock:
@@ -176,7 +191,7 @@ class Hub:
                 del self._sessions[key]
         refused = []
         for key, info in listed.items():
-            if key in self._sessions or info.kind is DeviceKind.BOARD:
+            if key in self._sessions or info.kind is DeviceKind.BOARD or before.get(key) != info:
                 continue
             try:
                 self._begin(info)

@@ -3,6 +3,7 @@
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -316,6 +317,37 @@ def test_devices_come_and_go_by_themselves(clock: FakeClock, station_file: Path)
         again = bench.run_to(1.4)
         assert any(s.serial == TRACKER.serial and s.tracked for s in again)
         assert EventKind.BACK in {e.kind for e in driver.events() if e.serial == TRACKER.serial}
+
+
+def test_a_device_whose_interfaces_come_one_by_one_is_opened_with_all_of_them(
+    clock: FakeClock, station_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(four(0.2)[2:], clock, lambda usb: LighthouseDriver(station_file, usb))
+    late = bench.devices[0]
+    late.unplug()
+    opened: list[UsbDeviceInfo] = []
+    claim, every = bench.transport.open, bench.transport.enumerate
+    there = 0
+
+    def one_more() -> list[UsbDeviceInfo]:
+        nonlocal there
+        there += late.plugged
+        return [
+            replace(i, interfaces=i.interfaces[:there]) if i.key == late.info.key else i
+            for i in every()
+        ]
+
+    def noted(info: UsbDeviceInfo) -> FakeOpenDevice:
+        opened.append(info)
+        return claim(info)
+
+    monkeypatch.setattr(bench.transport, "enumerate", one_more)
+    monkeypatch.setattr(bench.transport, "open", noted)
+    with bench.driver:
+        late.plug()
+        wait_until(lambda: late.opened == 1, "it is opened")
+    assert opened[-1] == late.info
+    assert len(opened) == 2
 
 
 def test_after_a_return_times_go_on_from_sample_to_sample(
