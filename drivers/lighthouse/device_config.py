@@ -61,7 +61,7 @@ def inflate_config(compressed: bytes) -> bytes:
         raise FileFormatError(f"the device's configuration is damaged: {error}") from error
     if not unpacking.eof:
         what = "is cut short" if len(data) < LONGEST_JSON else f"is over {LONGEST_JSON} bytes"
-        raise FileFormatError(f"the device's configuration {what}: ask for it again")
+        raise FileFormatError(f"the device's configuration {what}")
     return data
 
 

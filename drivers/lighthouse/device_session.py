@@ -39,6 +39,8 @@ QUICK_TRIES, QUICK_S = 5, 0.02
 """What is being switched on behind a dongle answers within this time; then it is asked seldom."""
 SILENT_READS = 60
 """Reads in vain (3 s) after which somebody else may answer behind a dongle."""
+PLUG_AGAIN = "It is left out until it answers: unplug it and plug it in again."
+SWITCH_ON = "Switch on its tracker or controller."
 ONLY_GEN1 = frozenset({DeviceKind.HEADSET, DeviceKind.WAND, DeviceKind.TRACKER})
 
 
@@ -140,7 +142,7 @@ class DeviceSession:
             start_reports(self.device, mode.gen2)
             version, ranges = ask_version(self.device), ask_ranges(self.device)
         except FileFormatError as error:
-            self._tell(f"{self.device.info.name}: {error}; it is left out.")
+            self._tell(f"{self.device.info.name}: {error}. {PLUG_AGAIN}")
             self.settled.set()
             self._stop.wait(BROKEN_S)
         except NoAnswer as error:
@@ -155,9 +157,11 @@ class DeviceSession:
         self._refused += 1
         if self._refused > QUICK_TRIES:
             if self.device.info.kind is DeviceKind.DONGLE:
-                self._tell(f"{self.device.info.name}: nothing is switched on behind it.")
+                self._tell(
+                    f"{self.device.info.name}: nothing is switched on behind it. {SWITCH_ON}"
+                )
             else:
-                self._tell(f"{error}; it is left out until it answers.")
+                self._tell(f"{error}. {PLUG_AGAIN}")
             self.settled.set()
 
     def _mode(self, model: DeviceModel) -> LightMode:

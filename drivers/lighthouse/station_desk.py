@@ -21,6 +21,11 @@ from lobstr_hw.errors import StationsNotSolved
 
 __all__ = ["StationDesk"]
 
+FOUND_AS_YOU_MOVE = (
+    "move a tracker about where it and another see it, and its place is found again."
+)
+FOUND_ANEW = "do as you are told next, and its place is found again."
+FAILED = "the solve failed. Carry the tracker on; if this stays, report it."
 TOLD_SHARES = 4
 """How often a solve tells how far it is."""
 
@@ -101,8 +106,8 @@ class StationDesk:
         self.stations = {n: s for n, s in self.stations.items() if n != number}
         self._by_id.pop(station.calibration.id, None)
         if station.calibration.id == self.heard[number].id:
-            rest = "its place is found again as you move" if self.stations else "find it again"
-            self._tell(f"{station_name(station.calibration)} was moved or restarted; {rest}.")
+            rest = FOUND_AS_YOU_MOVE if self.stations else FOUND_ANEW
+            self._tell(f"{station_name(station.calibration)} was moved or restarted: {rest}")
         self._changed(True)
 
     def _want(self, number: int, calibration: StationCalibration) -> None:
@@ -155,7 +160,7 @@ class StationDesk:
 
     def _take_up(self, survey: Survey, solved: StationSolution | StationsNotSolved | None) -> None:
         if not isinstance(solved, StationSolution):
-            self._tell(f"Not yet: {solved or 'the solve failed'}")
+            self._tell(f"Not yet: {solved or FAILED}")
             return
         fault = survey.fault(solved)
         if fault:
