@@ -11,7 +11,7 @@ from typing import Any
 
 from lobstr_hw.drivers.driver import TrackerDriver
 
-__all__ = ["DRIVERS", "driver_class", "load_driver", "split_driver_spec"]
+__all__ = ["DRIVERS", "driver_class", "load_driver", "split_driver_spec", "with_option"]
 
 DRIVERS: Mapping[str, tuple[str, str]] = {
     "fake": ("lobstr_hw.drivers.fake", "FakeDriver"),
@@ -59,6 +59,18 @@ def split_driver_spec(spec: str) -> tuple[str, dict[str, str]]:
             raise ValueError(f"{part!r} in {spec!r} is not one key=value (NAME:key=value,...)")
         options[key] = value
     return name, options
+
+
+def with_option(spec: str, key: str, value: object) -> str | None:
+    """The spec with one more option; as it is where that is set, None where the driver lacks it.
+
+    Raises:
+        ValueError: there is no such driver, or the spec cannot be read.
+    """
+    name, options = split_driver_spec(spec)
+    if key not in getattr(driver_class(name), "options", {}):
+        return None
+    return spec if key in options else f"{spec}{',' if options else ':'}{key}={value}"
 
 
 def load_driver(spec: str) -> TrackerDriver:

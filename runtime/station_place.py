@@ -4,7 +4,7 @@ from pathlib import Path
 
 import platformdirs
 
-from lobstr_hw.drivers import driver_class, split_driver_spec
+from lobstr_hw.drivers import with_option
 
 __all__ = ["default_stations_path", "with_station_file"]
 
@@ -20,8 +20,4 @@ def with_station_file(spec: str) -> str:
     Raises:
         ValueError: there is no such driver.
     """
-    name, options = split_driver_spec(spec)
-    keeps_stations = "stations" in getattr(driver_class(name), "options", {})
-    if not keeps_stations or "stations" in options:
-        return spec
-    return f"{spec}{',' if options else ':'}stations={default_stations_path()}"
+    return with_option(spec, "stations", default_stations_path()) or spec

@@ -6,8 +6,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from lobstr_hw.errors import LobstrError
+from lobstr_hw.runtime.commands.ending import ended
 from lobstr_hw.runtime.commands.numbers import above_zero
+from lobstr_hw.runtime.stopping import StopRequest
 
 __all__ = ["main"]
 
@@ -15,19 +16,23 @@ EXAMPLES = """examples:
   lobstr-bench lighthouse                      a made-up room with three trackers
   lobstr-bench lighthouse take.pcap.gz         and a recording
 """
+STOPPED = "stopped; what was measured stands above."
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code."""
     options = _parser().parse_args(argv)
-    try:
-        return _lighthouse(options)
-    except LobstrError as error:
-        print(f"lobstr-bench: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("lobstr-bench: stopped", file=sys.stderr)
-        return 0
+    return ended(
+        lambda stop: _lighthouse(options, stop),
+        _tell,
+        as_json=options.json,
+        stopped=STOPPED,
+        stopped_document={"stopped": True},
+    )
+
+
+def _tell(message: str) -> None:
+    print(f"lobstr-bench: {message}", file=sys.stderr)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -55,7 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _lighthouse(options: argparse.Namespace) -> int:
+def _lighthouse(options: argparse.Namespace, stop: StopRequest) -> int:
     from lobstr_hw.drivers.vendor import require_library
 
     require_library("scipy", "scipy", "lighthouse")
@@ -67,7 +72,11 @@ def _lighthouse(options: argparse.Namespace) -> int:
     for row in bench.measure(options.files, options.stations, options.seconds):
         rows.append(row)
         print(row.line(), file=progress, flush=True)
+        if stop():
+            raise KeyboardInterrupt
     live = bench.measure_live(options.seconds)
+    if stop():
+        raise KeyboardInterrupt
     print(live.line(), file=progress)
     if options.json:
         print(json.dumps({"runs": [row.document() for row in rows], "live": live.document()}))

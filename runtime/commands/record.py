@@ -102,15 +102,17 @@ def _specs(specs: Sequence[str], raw: Path | None) -> Sequence[str]:
     Raises:
         ValueError: none of them can.
     """
-    from lobstr_hw.drivers import driver_class, split_driver_spec
+    from lobstr_hw.drivers import with_option
 
     if raw is None:
         return specs
     specs = list(specs) or ["lighthouse"]
     for k, spec in enumerate(specs):
-        name, options = split_driver_spec(spec)
-        if "raw" in getattr(driver_class(name), "options", {}):
-            specs[k] = f"{spec}{',' if options else ':'}raw={raw}"
+        with_raw = with_option(spec, "raw", raw)
+        if with_raw == spec:
+            raise ValueError(f"{spec} has raw= already: leave that or --raw out")
+        if with_raw is not None:
+            specs[k] = with_raw
             return specs
     raise ValueError("--raw is what goes over USB: it needs --driver lighthouse")
 

@@ -4,11 +4,11 @@ from enum import StrEnum
 from pathlib import Path
 
 from lobstr_hw.drivers.lighthouse.capture_stream import CutShort, open_capture, take
+from lobstr_hw.drivers.lighthouse.recordings import usb_reports
 from lobstr_hw.runtime.commands.log_export import CSV_COLUMNS
 
 __all__ = ["RecordingKind", "recording_kind"]
 
-PCAP, PCAPNG = b"\xd4\xc3\xb2\xa1", b"\x0a\x0d\x0d\x0a"
 LOOKED_AT = 256
 
 
@@ -27,15 +27,15 @@ def recording_kind(path: Path) -> RecordingKind:
     Raises:
         FileFormatError: there is no such file.
     """
+    if usb_reports(path) is not None:
+        return RecordingKind.USB
     with open_capture(path) as stream:
         begin = b""
         try:
-            while len(begin) < LOOKED_AT:
+            while len(begin) < LOOKED_AT and not begin.endswith(b"\n"):
                 begin += take(stream, 1)
         except CutShort:
             pass
-    if begin[:4] in (PCAP, PCAPNG):
-        return RecordingKind.USB
     line = begin.split(b"\n")[0].decode("utf-8", "replace").strip()
     if line.startswith(CSV_COLUMNS[0]):
         return RecordingKind.CSV
