@@ -121,7 +121,7 @@ def _person(refinement: Refinement) -> list[Check]:
     held = np.rad2deg(refinement.held_rad)
     stand = "stand up straight; is the floor of the tracking space at height 0?"
     checks = [
-        Check("fits a person", fit.misfit, 0.0, 2.0, "deviations", stand),
+        Check("fits a person", fit.misfit, 0.0, 1.8, "deviations", stand),
         Check("legs", 100.0 * fit.leg, -9.0, 9.0, "%", stand),
         *(
             Check(
