@@ -21,7 +21,8 @@ class ReplayDriver(TrackerDriver):
     """Gives a log's samples at their own times, which begin at 0 with the first message.
 
     How fast it goes is up to whoever polls: time comes as ``now_s`` only. Everything stands in the
-    log: a loss is a sample with ``tracked`` False, a broken number a NaN in a pose.
+    log: a loss is a sample with ``tracked`` False, a broken number a NaN in a pose; buttons and
+    commands come again, and the play space is set up anew at the same moment.
     """
 
     options: ClassVar = {"file": str}
@@ -85,7 +86,7 @@ class ReplayDriver(TrackerDriver):
         return [_device(track, self._now_s) for track in self._log.trackers]
 
     def events(self) -> Sequence[DeviceEvent]:
-        """Buttons and disappearances up to the time last polled."""
+        """Buttons, disappearances and what else happened, up to the time last polled."""
         due = [event for event in self._events if event.time_s <= self._now_s]
         self._events = self._events[len(due) :]
         return due
@@ -104,7 +105,7 @@ def _device(track: TrackerTrack, now_s: float) -> DeviceInfo:
 
 
 def _all_events(log: TrackerLog) -> list[DeviceEvent]:
-    events = [event for track in log.trackers for event in _events_of(track)]
+    events = [*log.events, *(event for track in log.trackers for event in _events_of(track))]
     return sorted(events, key=lambda event: event.time_s)
 
 

@@ -27,6 +27,7 @@ LOOK_BACK_S = 0.25
 """A heading is the mean over so long."""
 
 Say = Callable[[Spoken], None]
+Hear = Callable[[DeviceEvent], None]
 
 
 class Controls:
@@ -35,7 +36,14 @@ class Controls:
     It looks at nothing but what the tick brings, so a replay obeys as the session did.
     """
 
-    def __init__(self, driver: TrackerDriver, session: Session, feed: Feed, say: Say) -> None:
+    def __init__(
+        self,
+        driver: TrackerDriver,
+        session: Session,
+        feed: Feed,
+        say: Say,
+        hear: Hear = lambda event: None,
+    ) -> None:
         """Get ready.
 
         Args:
@@ -43,8 +51,10 @@ class Controls:
             session: obeys.
             feed: the trackers by role.
             say: rings and speaks, at once.
+            hear: is told of every event.
         """
         self._driver, self._session, self._feed, self._say = driver, session, feed, say
+        self._hear = hear
         self._gestures = Gestures(feed.table.of)
         self._lookout = Lookout(driver, session, feed)
         self._was_calibrated = session.calibrated
@@ -58,6 +68,8 @@ class Controls:
             self._was_calibrated = True
             self._say(Spoken("Calibrated.", Sound.DONE))
         events = self._driver.events()
+        for event in events:
+            self._hear(event)
         for words in notices(events):
             self._say(Spoken(words))
         self._recentre(tick.time_s, samples, events)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lobstr_hw.avatar import AHEAD
-from lobstr_hw.drivers.driver import TrackerDriver
+from lobstr_hw.drivers.driver import DeviceEvent, TrackerDriver
 from lobstr_hw.drivers.replay import ReplayDriver
 from lobstr_hw.errors import OutputError
 from lobstr_hw.predictors import load_predictor
@@ -101,6 +101,7 @@ class LiveSession:
         self.clock = clock or HostClock()
         self.outputs: list[Output] = []
         self._queues: list[QueuedOutput] = []
+        self._listeners: list[Callable[[DeviceEvent], None]] = []
         self._open = ExitStack()
         self._pose: SkeletonPose | None = None
 
@@ -138,7 +139,7 @@ class LiveSession:
         )
         if isinstance(self.driver, ReplayDriver):
             self._check_log(self.driver)
-        self.controls = Controls(self.driver, self.session, self.feed, self.say)
+        self.controls = Controls(self.driver, self.session, self.feed, self.say, self._hear)
         grid = Grid(options.rate_hz, predictor.card.rate_hz, 0.0, options.input_delay_s)
         self.ticks = Ticks(
             options.rate_hz, grid, 0.0, self.clock, paced=not options.fast, last=self._last_tick()
@@ -169,7 +170,7 @@ class LiveSession:
         return None if end_s is None else int(end_s * self.options.rate_hz + 1e-6)
 
     def _open_outputs(self, table: RoleTable) -> None:
-        facts = SessionFacts(table.of, self._unix_offset_s, self.tell)
+        facts = SessionFacts(table.of, self._unix_offset_s, self.tell, self._listeners.append)
         for spec in self.options.outputs:
             self._spare_the_log(spec)
             output = make_output(spec, facts)
@@ -179,6 +180,10 @@ class LiveSession:
             self._queues.append(output)
             if self.session.calibrated:
                 output.calibrated(self.session.body)
+
+    def _hear(self, event: DeviceEvent) -> None:
+        for listener in self._listeners:
+            listener(event)
 
     def _unix_offset_s(self, now_s: float) -> float | None:
         """What to add to session times; a replay hands on what its log says, if anything."""

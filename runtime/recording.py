@@ -1,9 +1,9 @@
 """Recording: what the drivers give, with time and serial, and nothing else."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 
-from lobstr_hw.drivers.driver import DeviceEvent, EventKind, TrackerDriver
+from lobstr_hw.drivers.driver import TrackerDriver
 from lobstr_hw.drivers.tracker_log import TrackerLogWriter
 from lobstr_hw.runtime.clock import Clock
 from lobstr_hw.runtime.many_drivers import ManyDrivers
@@ -27,7 +27,6 @@ class TrackerTally:
     Attributes:
         role: the body part, where it is known.
         battery: 0 to 1, or None.
-        buttons: those held down.
         samples: how many there were.
         dropouts: times without sight, or without samples.
         lost_s: all of them together.
@@ -36,7 +35,6 @@ class TrackerTally:
 
     role: TrackerRole | None = None
     battery: float | None = None
-    buttons: set[str] = field(default_factory=set)
     samples: int = 0
     dropouts: int = 0
     lost_s: float = 0.0
@@ -124,9 +122,10 @@ class Recorder:
         events = self._driver.events()
         for words in notices(events):
             self._tell(words)
-        self._note(events)
         for serial, first in new.items():  # a tracker's state stands before its first pose
             self._write_state(serial, first.time_s, first)
+        for event in events:
+            self._writer.add_event(event)
         for sample in samples:
             self.trackers[sample.serial].add(sample)
         self._writer.add_samples(samples)
@@ -145,15 +144,6 @@ class Recorder:
         """Samples are kept as the drivers gave them, so a replay has to know whose each is."""
         return {serial: driver.space_of(serial) or "" for serial in self.trackers}
 
-    def _note(self, events: Iterable[DeviceEvent]) -> None:
-        for event in events:
-            tally = self.trackers.get(event.serial)
-            if tally is None or event.kind not in (EventKind.BUTTON_DOWN, EventKind.BUTTON_UP):
-                continue
-            down = event.kind is EventKind.BUTTON_DOWN
-            (tally.buttons.add if down else tally.buttons.discard)(event.name)
-            self._write_state(event.serial, max(event.time_s, 0.0))
-
     def _write_state(self, serial: str, time_s: float, sample: TrackerSample | None = None) -> None:
         tally = self.trackers[serial]
         sample = sample or tally.newest
@@ -166,5 +156,5 @@ class Recorder:
             sample.tracked,
             time_s,
             tally.battery,
-            tuple(sorted(tally.buttons)),
+            self._writer.buttons(serial),
         )

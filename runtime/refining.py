@@ -12,8 +12,10 @@ from pathlib import Path
 
 from lobstr_hw.drivers.replay import ReplayDriver
 from lobstr_hw.errors import LogFileError
+from lobstr_hw.poses import Pose
 from lobstr_hw.predictors import load_predictor
 from lobstr_hw.predictors.lobstr import Lobstr
+from lobstr_hw.predictors.predictor import Frame
 from lobstr_hw.predictors.refined import SHORTEST_S, refined
 from lobstr_hw.predictors.two_way import TwoWay, load_two_way
 from lobstr_hw.runtime.live import LiveOptions, LiveSession
@@ -38,10 +40,17 @@ class Request(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
-    """A tick of a recording: what was seen, and what the user asked for just before."""
+    """A tick of a recording: what was seen, and what happened just before.
+
+    Attributes:
+        sight: of the tick.
+        asked: what the user asked for.
+        T_new_old: the play space was set up anew; heights over the floor left alone.
+    """
 
     sight: Sight
-    asked: tuple[Request, ...]
+    asked: tuple[Request, ...] = ()
+    T_new_old: Pose | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,12 +80,14 @@ class Requests(Presentation):
 
     Attributes:
         noted: since it was last emptied.
+        shifted: the world, since it was last emptied.
     """
 
     def __init__(self) -> None:
         """Nothing yet."""
         super().__init__()
         self.noted: list[Request] = []
+        self.shifted: Pose | None = None
 
     def freeze(self) -> bool:
         """Note it; the answer is spoken as it was live."""
@@ -84,11 +95,21 @@ class Requests(Presentation):
         self.frozen = not self.frozen
         return self.frozen
 
+    def shift_world(self, T_new_old: Pose) -> None:
+        """Note it; nothing that is shown is kept here."""
+        self.shifted = T_new_old
+
     def sit(self) -> bool:
         """Note it."""
         self.noted.append(Request.SIT)
         self.seated = not self.seated
         return self.seated
+
+    def take(self) -> tuple[tuple[Request, ...], Pose | None]:
+        """What was noted, which is forgotten."""
+        noted, self.noted = tuple(self.noted), []
+        shifted, self.shifted = self.shifted, None
+        return noted, shifted
 
 
 def seen_in(path: Path, profile: Path | None, tell: Tell, step: Step) -> Recording:
@@ -110,8 +131,8 @@ def seen_in(path: Path, profile: Path | None, tell: Tell, step: Step) -> Recordi
         requests = live.session.presentation = Requests()
         for tick in live.ticks:
             take_in(tick, live.source, live.feed, live.session, control=live.controls)
-            moments.append(Moment(live.session.look(tick, live.feed), tuple(requests.noted)))
-            requests.noted.clear()
+            sight = live.session.look(tick, live.feed)
+            moments.append(Moment(sight, *requests.take()))
             if tick.index % 90 == 0:
                 step(tick.time_s, driver.duration_s)
         if not live.session.calibrated:
@@ -137,6 +158,8 @@ def refined_poses(
 
 
 def _show(session: Session, moment: Moment) -> SkeletonPose:
+    if moment.T_new_old is not None:
+        session.shift_world(moment.T_new_old)
     for request in moment.asked:
         if request is Request.FREEZE:
             session.presentation.freeze()
@@ -146,7 +169,7 @@ def _show(session: Session, moment: Moment) -> SkeletonPose:
 
 
 def _second_session(recording: Recording, live: Lobstr, two_way: TwoWay) -> Session:
-    frames = [frame for moment in recording.moments for frame in moment.sight.grid]
+    frames = _in_one_world(recording)
     rate_hz = live.card.rate_hz
     if len(frames) < SHORTEST_S * rate_hz:
         raise LogFileError(
@@ -162,6 +185,22 @@ def _second_session(recording: Recording, live: Lobstr, two_way: TwoWay) -> Sess
         rate_hz=options.rate_hz,
         input_delay_s=options.input_delay_s,
     )
+
+
+def _in_one_world(recording: Recording) -> list[Frame]:
+    """The grid's frames, all in the world of the last: nobody leaps where the space was moved."""
+    scale = float(recording.body.scale[0])
+    frames: list[Frame] = []
+    T_last = Pose.identity()
+    for moment in reversed(recording.moments):
+        frames += [_moved(frame, T_last) for frame in reversed(moment.sight.grid)]
+        if (T := moment.T_new_old) is not None:
+            T_last = T_last @ Pose(T.R, scale * T.p)
+    return frames[::-1]
+
+
+def _moved(frame: Frame, T: Pose) -> Frame:
+    return replace(frame, p=T.apply(frame.p), R=T.R @ frame.R)
 
 
 def _shipped_live() -> Lobstr:

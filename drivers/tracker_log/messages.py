@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from lobstr_hw.drivers.driver import DeviceEvent, EventKind
 from lobstr_hw.drivers.tracker_log.schemas import WORLD_FRAME
 from lobstr_hw.rotations import Array, to_quat_xyzw, transpose
 from lobstr_hw.skeleton import HUMANOID_NAMES, PARENTS, global_rotations
@@ -26,8 +27,10 @@ __all__ = [
     "PoseReading",
     "SkeletonReading",
     "TruthReading",
+    "event_message",
     "nanoseconds",
     "pose_message",
+    "read_event",
     "read_pose",
     "read_skeleton",
     "read_state",
@@ -190,6 +193,27 @@ def read_state(data: bytes) -> DeviceState:
         message.get("battery"),
         tuple(message.get("buttons") or ()),
     )
+
+
+def event_message(time_ns: int, event: DeviceEvent) -> bytes:
+    """A ``lobstr.Event``."""
+    whole_s, rest_ns = divmod(time_ns, 1_000_000_000)
+    message = {
+        "timestamp": {"sec": whole_s, "nsec": rest_ns},
+        "kind": event.kind,
+        "serial": event.serial,
+        "name": event.name,
+    }
+    return json.dumps(message, separators=(",", ":")).encode()
+
+
+def read_event(time_s: float, data: bytes) -> DeviceEvent | None:
+    """The inverse of :func:`event_message`; None for a kind that is not known here."""
+    message = json.loads(data)
+    if message["kind"] not in set(EventKind):
+        return None
+    kind = EventKind(message["kind"])
+    return DeviceEvent(kind, message.get("serial", ""), time_s, message.get("name", ""))
 
 
 def skeleton_message(time_ns: int, pose: SkeletonPose) -> bytes:

@@ -4,12 +4,13 @@ from __future__ import annotations  # array is subscriptable from Python 3.12 on
 
 import math
 from array import array
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 
+from lobstr_hw.drivers.driver import DeviceEvent
 from lobstr_hw.drivers.tracker_log import schemas
 from lobstr_hw.drivers.tracker_log.container import RecordFile
 from lobstr_hw.drivers.tracker_log.messages import (
@@ -17,6 +18,7 @@ from lobstr_hw.drivers.tracker_log.messages import (
     PoseReading,
     SkeletonReading,
     TruthReading,
+    read_event,
     read_pose,
     read_skeleton,
     read_state,
@@ -152,6 +154,7 @@ class _Content:
         self.trackers: dict[str, _TrackRows] = {}
         self.truth: list[tuple[int, TruthReading]] = []
         self.skeleton: list[tuple[int, SkeletonReading]] = []
+        self.events: list[tuple[int, DeviceEvent]] = []
         self.metadata: dict[str, dict[str, str]] = {}
         self.profile: bytes | None = None
 
@@ -179,6 +182,9 @@ class _Content:
         elif (topic, schema) == (schemas.SKELETON_TOPIC, schemas.FRAME_TRANSFORMS):
             if self.with_skeleton:
                 self.skeleton.append((time_ns, read_skeleton(data)))
+        elif (topic, schema) == (schemas.EVENTS_TOPIC, schemas.EVENT):
+            if (event := read_event(seconds(time_ns), data)) is not None:
+                self.events.append((time_ns, event))
 
     def _rows(self, serial: str) -> _TrackRows:
         return self.trackers.setdefault(serial, _TrackRows(serial))
@@ -203,6 +209,7 @@ class _Content:
             profile=self.profile,
             truth=self._truth_track(start_ns),
             skeleton=self._skeleton_track(start_ns),
+            events=self._events(start_ns),
             damage=damage,
         )
 
@@ -221,6 +228,10 @@ class _Content:
         if start is None or end is None:
             return None
         return start - start_s, end - start_s
+
+    def _events(self, start_ns: int) -> tuple[DeviceEvent, ...]:
+        timed = sorted(self.events, key=lambda item: item[0])  # stable
+        return tuple(replace(event, time_s=seconds(t - start_ns)) for t, event in timed)
 
     def _truth_track(self, start_ns: int) -> TruthTrack | None:
         if not self.truth:

@@ -9,6 +9,8 @@ import json
 from typing import Any
 
 __all__ = [
+    "EVENT",
+    "EVENTS_TOPIC",
     "FRAME_TRANSFORMS",
     "POSE_IN_FRAME",
     "SCHEMAS",
@@ -28,11 +30,13 @@ POSE_IN_FRAME = "foxglove.PoseInFrame"
 FRAME_TRANSFORMS = "foxglove.FrameTransforms"
 TRACKER_STATE = "lobstr.TrackerState"
 TRUTH = "lobstr.Truth"
+EVENT = "lobstr.Event"
 
 TRACKERS_PREFIX = "/trackers/"
 STATE_SUFFIX = "/state"
 SKELETON_TOPIC = "/skeleton"
 TRUTH_TOPIC = "/truth"
+EVENTS_TOPIC = "/events"
 WORLD_FRAME = "world"
 """Name of the tracking space: right-handed, +Y up, metres (docs/conventions.md)."""
 
@@ -106,6 +110,13 @@ SCHEMAS: dict[str, dict[str, Any]] = {
         state=_STRING,
         battery={"type": "number", "minimum": 0, "maximum": 1},
         buttons={"type": "array", "items": _STRING, "description": "those held down"},
+    ),
+    EVENT: _object(
+        EVENT,
+        timestamp=_TIME,
+        kind=_STRING | {"description": "recentred, or command"},
+        serial=_STRING | {"description": "empty: of no single device"},
+        name=_STRING | {"description": "of the command"},
     ),
     TRUTH: _object(
         TRUTH,

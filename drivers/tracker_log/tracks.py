@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from lobstr_hw.drivers.driver import DeviceEvent
 from lobstr_hw.drivers.tracker_log.messages import DeviceState
 from lobstr_hw.poses import PartialPose
 from lobstr_hw.rotations import Array, from_quat_xyzw
@@ -152,6 +153,7 @@ class TrackerLog:
         profile: the calibration profile's bytes, where one is attached.
         truth: of a made log.
         skeleton: of a log recorded with the avatar.
+        events: of no single tracker, oldest first: the play space was set up anew, commands.
         damage: why the reading ended before the file's end, or "".
     """
 
@@ -164,6 +166,7 @@ class TrackerLog:
     profile: bytes | None
     truth: TruthTrack | None
     skeleton: SkeletonTrack | None
+    events: tuple[DeviceEvent, ...]
     damage: str
 
     @property

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -9,10 +10,12 @@ from typing import Self
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
+from lobstr_hw.drivers.driver import DeviceEvent, EventKind
 from lobstr_hw.drivers.tracker_log import schemas
 from lobstr_hw.drivers.tracker_log.container import LIBRARY, PROFILE, RecordFile, copy_compressed
 from lobstr_hw.drivers.tracker_log.messages import (
     DeviceState,
+    event_message,
     nanoseconds,
     pose_message,
     skeleton_message,
@@ -90,6 +93,28 @@ class TrackerLogWriter:
         device = DeviceState(role, tracked, state, battery, buttons)
         self._add_state(serial, device, nanoseconds(time_s))
         self._stream.flush()
+
+    def add_event(self, event: DeviceEvent) -> None:
+        """Something happened: buttons become a state of their tracker, once it has one.
+
+        Notices are left out, for their words are of the moment; what becomes of a tracker stands in
+        its samples.
+        """
+        time_ns, held = nanoseconds(max(event.time_s, 0.0)), self._states.get(event.serial)
+        if event.kind in (EventKind.RECENTRED, EventKind.COMMAND):
+            data = event_message(time_ns, event)
+            self._add(schemas.EVENTS_TOPIC, schemas.EVENT, time_ns, data)
+        elif held and event.kind in (EventKind.BUTTON_DOWN, EventKind.BUTTON_UP):
+            kept = set(held.buttons) - {event.name}
+            down = {event.name} if event.kind is EventKind.BUTTON_DOWN else set()
+            device = replace(held, buttons=tuple(sorted(kept | down)))
+            self._add_state(event.serial, device, time_ns)
+        self._stream.flush()
+
+    def buttons(self, serial: str) -> tuple[str, ...]:
+        """Those of a tracker that are held down, as far as was written."""
+        held = self._states.get(serial)
+        return () if held is None else held.buttons
 
     def add_skeleton(self, pose: SkeletonPose) -> None:
         """The body as it was sent out."""

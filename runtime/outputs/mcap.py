@@ -1,8 +1,10 @@
 """``mcap:FILE``: a tracker log with the skeleton in it; Foxglove and Rerun open it as it is."""
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from lobstr_hw.drivers.driver import DeviceEvent
 from lobstr_hw.drivers.tracker_log.writer import TrackerLogWriter
 from lobstr_hw.errors import LogFileError, OutputError
 from lobstr_hw.skeleton import Body
@@ -13,7 +15,11 @@ __all__ = ["McapOutput"]
 
 
 class McapOutput:
-    """Samples as the drivers gave them, before any maths, and the skeleton of every tick."""
+    """Samples as the drivers gave them, before any maths, and the skeleton of every tick.
+
+    Attributes:
+        events: what happened and is to be written; whoever hears of it adds it, from any thread.
+    """
 
     def __init__(
         self,
@@ -31,6 +37,7 @@ class McapOutput:
         """
         self.path = path
         self._unix_offset_s = unix_offset_s
+        self.events: deque[DeviceEvent] = deque()
         self._begun = False
         self._role_of = role_of
         self._writer: TrackerLogWriter | None = None
@@ -48,19 +55,21 @@ class McapOutput:
         """Nothing to do: transforms are written as they are."""
 
     def send(self, pose: SkeletonPose, samples: Sequence[TrackerSample]) -> None:
-        """The samples of a tick, a role where it is new, then the skeleton."""
+        """What happened and the samples of a tick, a role where it is new, then the skeleton."""
         assert self._writer is not None
         if not self._begun:
             self._begun = True
             self._mark_clock(self._writer, pose.time_s)
         for sample in samples:
             self._note_role(self._writer, sample)
+        self._note_events(self._writer)
         self._writer.add_samples(samples)
         self._writer.add_skeleton(pose)
 
     def close(self) -> None:
         """Finish the file."""
         if self._writer is not None:
+            self._note_events(self._writer)
             self._writer.close()
             self._writer = None
 
@@ -69,8 +78,19 @@ class McapOutput:
         if offset_s is not None:
             writer.mark_clock(offset_s)
 
+    def _note_events(self, writer: TrackerLogWriter) -> None:
+        while self.events:
+            writer.add_event(self.events.popleft())
+
     def _note_role(self, writer: TrackerLogWriter, sample: TrackerSample) -> None:
         role = self._role_of(sample.serial)
         if role is not None and self._roles.get(sample.serial) != role:
             self._roles[sample.serial] = role
-            writer.add_state(sample.serial, role, sample.state, sample.tracked, sample.time_s)
+            writer.add_state(
+                sample.serial,
+                role,
+                sample.state,
+                sample.tracked,
+                sample.time_s,
+                buttons=writer.buttons(sample.serial),
+            )

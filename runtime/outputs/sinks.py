@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+from lobstr_hw.drivers.driver import DeviceEvent
 from lobstr_hw.runtime.outputs.output import Output
 from lobstr_hw.runtime.outputs.queued import QueuedOutput
 from lobstr_hw.trackers import TrackerRole
@@ -25,11 +26,13 @@ class SessionFacts:
         unix_offset_s: given the session time of now, what to add to session times for UNIX time;
             None where nobody knows.
         tell: takes a message for the user.
+        listen: takes what wants to be told of every event, in the thread of the loop.
     """
 
     role_of: Callable[[str], TrackerRole | None]
     unix_offset_s: Callable[[float], float | None]
     tell: Callable[[str], None]
+    listen: Callable[[Callable[[DeviceEvent], None]], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +61,9 @@ def _bvh(spec: SinkSpec, facts: SessionFacts) -> Output:
 def _mcap(spec: SinkSpec, facts: SessionFacts) -> Output:
     from lobstr_hw.runtime.outputs.mcap import McapOutput
 
-    return McapOutput(Path(spec.rest), facts.role_of, facts.unix_offset_s)
+    output = McapOutput(Path(spec.rest), facts.role_of, facts.unix_offset_s)
+    facts.listen(output.events.append)
+    return output
 
 
 def _ndjson(spec: SinkSpec, facts: SessionFacts) -> Output:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lobstr_hw.drivers.driver import EventKind
+from lobstr_hw.drivers.driver import DeviceEvent, EventKind
 from lobstr_hw.drivers.fake import FakeDriver
 from lobstr_hw.drivers.replay import ReplayDriver
 from lobstr_hw.drivers.tracker_log import TrackerLogWriter
@@ -99,6 +99,30 @@ def test_buttons_and_disappearances_are_events_at_their_time(path: Path) -> None
         (EventKind.BACK, "", 4.0),
     ]
     assert (device.kind, device.role_hint, device.battery) == ("controller", role, 0.7)
+
+
+def test_a_new_play_space_and_commands_come_again_in_their_order(path: Path) -> None:
+    happened = [
+        DeviceEvent(EventKind.RECENTRED, "", START_S - 0.5),
+        DeviceEvent(EventKind.COMMAND, "", START_S + 1.0, "freeze"),
+        DeviceEvent(EventKind.BUTTON_DOWN, "A", START_S + 1.5, "trigger"),
+        DeviceEvent(EventKind.RECENTRED, "", START_S + 2.0),
+    ]
+    with TrackerLogWriter(path) as writer:
+        writer.add_sample(sample(0.0))
+        for event in happened:
+            writer.add_event(event)
+        writer.add_event(DeviceEvent(EventKind.NOTICE, "", START_S + 2.1, "a station was moved"))
+        writer.add_sample(sample(4.0))
+    with ReplayDriver(path) as driver:
+        driver.poll(1.9)
+        first = driver.events()
+        driver.poll(5.0)
+        rest = driver.events()
+        assert driver.duration_s == pytest.approx(4.0)
+    assert [(e.kind, e.name) for e in (*first, *rest)] == [(e.kind, e.name) for e in happened]
+    assert [e.time_s for e in first] == pytest.approx([-0.5, 1.0, 1.5])
+    assert [e.time_s for e in rest] == pytest.approx([2.0])
 
 
 def test_a_cut_log_is_replayed_up_to_the_cut(path: Path) -> None:

@@ -128,6 +128,20 @@ def test_buttons_and_batteries_are_states_from_their_time_on(tmp_path: Path) -> 
     assert track.device_at(2.0).battery == 0.1
 
 
+def test_a_new_play_space_and_commands_are_recorded(tmp_path: Path) -> None:
+    driver = PressedDriver([sample(k * 0.1) for k in range(30)], {"A": TrackerRole.LEFT_HAND})
+    recording = recorder(driver, tmp_path / "a.mcap", FakeClock(0.0))
+    recording.step(0.45)
+    happened = (
+        DeviceEvent(EventKind.RECENTRED, "", 0.5),
+        DeviceEvent(EventKind.COMMAND, "", 0.6, "freeze"),
+    )
+    driver.happened = happened
+    recording.step(2.0)
+    recording._writer.close()
+    assert read_log(tmp_path / "a.mcap").events == happened
+
+
 def test_a_tracker_that_goes_is_recorded_as_gone(tmp_path: Path) -> None:
     gone = replace(sample(0.5, tracked=False), state=TrackingState.GONE)
     driver = ListDriver([sample(0.0), sample(0.4), gone], {"A": None})

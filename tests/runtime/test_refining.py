@@ -7,9 +7,13 @@ import numpy as np
 import pytest
 from support.made_logs import made_take, without, write_log
 
+from lobstr_hw.drivers.driver import DeviceEvent, EventKind
 from lobstr_hw.drivers.replay import ReplayDriver
 from lobstr_hw.errors import CalibrationError, LobstrError, LogFileError
+from lobstr_hw.poses import Pose
+from lobstr_hw.rotations import rotation_y
 from lobstr_hw.runtime.live import LiveOptions, LiveSession
+from lobstr_hw.runtime.one_space import moved
 from lobstr_hw.runtime.outputs.output import Output
 from lobstr_hw.runtime.refining import (
     Moment,
@@ -149,6 +153,32 @@ def test_a_body_that_was_seated_sits_again(recording: Recording) -> None:
     np.testing.assert_array_equal(stacked(poses[:100], "p_world"), stacked(plain[:100], "p_world"))
     assert all(pose.mode is Mode.SEATED for pose in poses[100:])
     assert not any(pose.mode is Mode.SEATED for pose in plain)
+
+
+def test_where_the_play_space_is_set_up_anew_the_legs_go_on(
+    recording: Recording, tmp_path: Path
+) -> None:
+    """The same person, said in another space from a moment on, told a little later."""
+    since_s = 4.0
+    T = Pose(rotation_y(2.0), np.array([1.5, 0.0, -0.7]))
+    path = write_log(
+        tmp_path / "moved.mcap",
+        made_take(seconds=4.0),
+        lambda samples: [moved(s, T) if s.time_s >= since_s else s for s in samples],
+        events=[DeviceEvent(EventKind.RECENTRED, "", since_s)],
+    )
+    seen = seen_in(path, None, quiet, quiet)
+    (at,) = [i for i, moment in enumerate(seen.moments) if moment.T_new_old is not None]
+    assert seen.moments[at].sight.time_s == pytest.approx(since_s, abs=0.03)
+    plain = stacked(list(refined_poses(recording)), "p_world")
+    p = stacked(list(refined_poses(seen)), "p_world")
+    p[at:] = T.inverse().apply(p[at:])
+    off = np.linalg.norm(p - plain, axis=-1)
+    assert off[:, REST].max() < 0.02, "what a body moves between two samples"
+    assert off[:, LEGS].max() < 0.05, "and a foot may be set down a little sooner or later"
+    jumps = np.linalg.norm(np.diff(p[at - 20 : at + 20, TOES], axis=0), axis=-1)
+    usual = np.linalg.norm(np.diff(plain[at - 20 : at + 20, TOES], axis=0), axis=-1)
+    assert jumps.max() < 1.1 * usual.max()
 
 
 def test_requests_are_noted_and_answered_as_live() -> None:

@@ -1,17 +1,24 @@
 """The play space is set up anew in the middle of a session."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
+from support.fake_clock import FakeClock
 
-from lobstr_hw.drivers.driver import DeviceEvent, EventKind
+from lobstr_hw.drivers.driver import DeviceEvent, EventKind, TrackerDriver
 from lobstr_hw.drivers.fake import SERIALS, FakeDriver
+from lobstr_hw.drivers.replay import ReplayDriver
+from lobstr_hw.drivers.tracker_log import TrackerLogWriter
 from lobstr_hw.poses import PartialPose, Pose
 from lobstr_hw.rotations import Array, from_rotation_vector, geodesic_angle, rotation_y
 from lobstr_hw.runtime.announcer import Sound, Spoken
 from lobstr_hw.runtime.live import LiveOptions, LiveSession
 from lobstr_hw.runtime.one_space import moved
+from lobstr_hw.runtime.outputs.sinks import SinkSpec
+from lobstr_hw.runtime.recording import Recorder
+from lobstr_hw.runtime.roles import RoleTable
 from lobstr_hw.runtime.world_shift import Shift, ShiftWatch, common_shift
 from lobstr_hw.skeleton import Body, Joint
 from lobstr_hw.skeleton_pose import SkeletonPose
@@ -73,11 +80,13 @@ class Capture:
 
 
 def played(
-    driver: FakeDriver, predictor: str = "lobstr"
+    driver: TrackerDriver, predictor: str = "lobstr", outputs: tuple[SinkSpec, ...] = ()
 ) -> tuple[LiveSession, Array, list[Spoken]]:
     """The session, all joints (ticks, 22, 3), and what was said."""
     capture, said = Capture(), list[Spoken]()
-    options = LiveOptions(predictor=predictor, fast=True, quiet=True, duration_s=6.5)
+    options = LiveOptions(
+        predictor=predictor, fast=True, quiet=True, duration_s=6.5, outputs=outputs
+    )
     with LiveSession(driver, options, lambda _: None, say=said.append) as live:
         live.outputs.append(capture)
         live.run(lambda: False)
@@ -158,6 +167,26 @@ def test_a_frozen_or_seated_body_is_taken_along(command: str) -> None:
     _, p, said = played(Recentred(commands=commands), "standing")
     assert sum("body moved along" in spoken.text for spoken in said) == 1
     assert np.linalg.norm(back(p, T_NEW_OLD) - still, axis=-1).max() < 0.01
+
+
+# a recording of it
+
+
+@pytest.mark.parametrize("command", ["live", "record"])
+def test_a_recording_is_replayed_with_the_new_play_space(tmp_path: Path, command: str) -> None:
+    path = tmp_path / "take.mcap"
+    driver = Recentred(told_s=AT_S + 0.1, commands=[(5.5, "freeze")])
+    if command == "live":
+        played(driver, "standing", outputs=(SinkSpec("mcap", str(path)),))
+    else:
+        with driver, TrackerLogWriter(path) as writer:
+            table = RoleTable(None, driver.devices)
+            Recorder(driver, writer, table, FakeClock(0.0), 90.0).run(lambda: False, 6.5)
+    _, there, live = played(Recentred(told_s=AT_S + 0.1, commands=[(5.5, "freeze")]), "standing")
+    _, again, said = played(ReplayDriver(path), "standing")
+    assert [spoken.text for spoken in said] == [spoken.text for spoken in live]
+    assert "The play space was set up anew; the body moved along." in {s.text for s in said}
+    assert np.abs(again - there[: len(again)]).max() < 1e-3, "a log rounds to micrometres"
 
 
 # the arithmetic

@@ -1,12 +1,13 @@
 """Small tracker logs, made as recordings are."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from support.motions import walking
 
+from lobstr_hw.drivers.driver import DeviceEvent
 from lobstr_hw.drivers.tracker_log import TrackerLogWriter
 from lobstr_hw.poses import PartialPose
 from lobstr_hw.simulation import SimulatedTake, TrackingErrors, simulate, take_samples
@@ -26,12 +27,15 @@ def write_log(
     take: SimulatedTake,
     change: Callable[[Iterable[TrackerSample]], Iterable[TrackerSample]] = iter,
     named: bool = True,
+    events: Sequence[DeviceEvent] = (),
 ) -> Path:
     """A take as a log; ``change`` sees the samples first, ``named`` False leaves roles out."""
     with TrackerLogWriter(path) as log:
         for role, serial in take.serials.items():
             log.add_state(serial, role if named else None, TrackingState.OK, True, 0.0)
         log.add_samples(list(change(take_samples(take))))
+        for event in events:
+            log.add_event(event)
         for time_s, p in zip(take.truth_times_s, take.truth_p, strict=True):
             log.add_truth(float(time_s), p)
     return path

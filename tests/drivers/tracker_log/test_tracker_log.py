@@ -10,8 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
+from lobstr_hw.drivers.driver import DeviceEvent, EventKind
 from lobstr_hw.drivers.tracker_log import TrackerLogWriter, container, read_log
-from lobstr_hw.drivers.tracker_log.messages import nanoseconds, seconds
+from lobstr_hw.drivers.tracker_log.messages import (
+    event_message,
+    nanoseconds,
+    read_event,
+    seconds,
+)
 from lobstr_hw.errors import LogFileError
 from lobstr_hw.poses import PartialPose
 from lobstr_hw.rotations import from_rotation_vector, geodesic_angle
@@ -131,6 +137,7 @@ def test_every_message_is_json_that_any_parser_reads(tmp_path: Path) -> None:
     with TrackerLogWriter(tmp_path / "a.mcap") as writer:
         writer.add_samples(random_samples(2))
         writer.add_sample(TrackerSample("N", PartialPose(np.eye(3), np.full(3, np.nan)), 1e6, True))
+        writer.add_event(DeviceEvent(EventKind.COMMAND, "", 1.5, "freeze"))
     seen = set()
     with (tmp_path / "a.mcap").open("rb") as stream:
         for schema, _, message in make_reader(stream).iter_messages():
@@ -141,7 +148,14 @@ def test_every_message_is_json_that_any_parser_reads(tmp_path: Path) -> None:
             published = json.loads(schema.data)["properties"]
             assert set(content) <= set(published), schema.name
             seen.add(schema.name)
-    assert seen == {"foxglove.PoseInFrame", "lobstr.TrackerState"}
+    assert seen == {"foxglove.PoseInFrame", "lobstr.TrackerState", "lobstr.Event"}
+
+
+def test_an_event_of_a_later_program_is_passed_over() -> None:
+    event = DeviceEvent(EventKind.RECENTRED, "", 2.0)
+    data = event_message(nanoseconds(2.0), event)
+    assert read_event(2.0, data) == event
+    assert read_event(2.0, data.replace(b"recentred", b"teleported")) is None
 
 
 def test_a_state_holds_until_the_next(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support.poses import random_poses
 
+from lobstr_hw.drivers.driver import DeviceEvent, EventKind
 from lobstr_hw.drivers.tracker_log import read_log
 from lobstr_hw.errors import OutputError
 from lobstr_hw.poses import PartialPose
@@ -52,6 +53,22 @@ def test_samples_roles_states_and_skeleton_are_read_back(tmp_path: Path) -> None
     np.testing.assert_allclose(
         log.skeleton.p_local[:, 0], [pose.p_world[0, 0] for pose in poses], atol=1e-6
     )
+
+
+def test_what_happened_is_kept_too(tmp_path: Path) -> None:
+    output = McapOutput(tmp_path / "out.mcap", ROLES.get)
+    output.open(BODY, 45.0, "take")
+    first, second = random_poses(1, 2, BODY)
+    output.send(first, samples(first.time_s))
+    pressed = DeviceEvent(EventKind.BUTTON_DOWN, "LHR-1", first.time_s + 0.01, "menu")
+    output.events.append(pressed)
+    output.send(second, samples(second.time_s))
+    output.events.append(DeviceEvent(EventKind.RECENTRED, "", second.time_s))
+    output.close()
+    log = read_log(tmp_path / "out.mcap")
+    held = [change.device.buttons for change in log.tracker("LHR-1").states]
+    assert held == [(), ("menu",)]
+    assert [event.kind for event in log.events] == [EventKind.RECENTRED]
 
 
 def test_the_same_calls_give_the_same_bytes(tmp_path: Path) -> None:
