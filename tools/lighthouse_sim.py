@@ -187,7 +187,7 @@ def follow(data: SimulatedSet, stations: Stations) -> tuple[PoseBatch, float]:
     for since in range(int(data.imu.ticks[0]), int(data.imu.ticks[-1]) + PIECE, PIECE):
         i, j = np.searchsorted(data.imu.ticks, [since, since + PIECE])
         k, n = np.searchsorted(data.angles.ticks, [since, since + PIECE])
-        imu = ImuSamples(data.imu.ticks[i:j], data.imu.acc_g[i:j], data.imu.gyro_rad_s[i:j])
+        imu = data.imu.take(slice(i, j))
         light = take_angles(data.angles, slice(int(k), int(n)))
         state, batch = step(state, data.model, stations, imu, light, settings)
         given.append(batch)

@@ -82,6 +82,20 @@ class ImuSamples:
         """Number of samples."""
         return len(self.ticks)
 
+    def take(self, which: NDArray[np.bool_] | Ints | slice) -> "ImuSamples":
+        """Some of them."""
+        return ImuSamples(self.ticks[which], self.acc_g[which], self.gyro_rad_s[which])
+
+    @staticmethod
+    def join(parts: Sequence["ImuSamples"]) -> "ImuSamples":
+        """All samples, one part after the other; none of no parts."""
+        parts = [ImuSamples(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3))), *parts]
+        return ImuSamples(
+            np.concatenate([part.ticks for part in parts]),
+            np.concatenate([part.acc_g for part in parts]),
+            np.concatenate([part.gyro_rad_s for part in parts]),
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DeviceModel:

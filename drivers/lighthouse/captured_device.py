@@ -4,19 +4,24 @@ from collections.abc import Iterable
 
 from lobstr_hw.drivers.lighthouse.angles import DeviceModel
 from lobstr_hw.drivers.lighthouse.capture_clock import CaptureClock
-from lobstr_hw.drivers.lighthouse.device_config import inflate_config, join_pieces, parse_config
+from lobstr_hw.drivers.lighthouse.device_config import (
+    CONFIG_PIECE,
+    CONFIG_START,
+    MOST_PIECES,
+    inflate_config,
+    join_pieces,
+    parse_config,
+)
 from lobstr_hw.drivers.lighthouse.device_reader import OLD_RADIO, DeviceReader
-from lobstr_hw.drivers.lighthouse.imu import ImuRanges, parse_ranges
+from lobstr_hw.drivers.lighthouse.imu import RANGES, ImuRanges, parse_ranges
 from lobstr_hw.drivers.lighthouse.usb_report import ReportKind, UsbReport
 from lobstr_hw.errors import FileFormatError
 
 __all__ = ["CapturedDevice", "read_devices"]
 
-RANGES, CONFIG_START, CONFIG_PIECE, DONGLE = 0x01, 0x10, 0x11, 0xFF
+DONGLE = 0xFF
 PROTOCOL, PROTOCOL_LENGTH = 0x87, 6
 RADIO_REPORTS = frozenset({0x23, 0x24})
-MOST_PIECES = 1_024
-"""Of a configuration; real ones have 60."""
 
 
 class CapturedDevice:

@@ -15,8 +15,14 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from lobstr_hw.drivers.lighthouse.device_config import inflate_config, join_pieces
-from lobstr_hw.drivers.lighthouse.imu import ImuRanges, parse_ranges
+from lobstr_hw.drivers.lighthouse.device_config import (
+    CONFIG_PIECE,
+    CONFIG_START,
+    MOST_PIECES,
+    inflate_config,
+    join_pieces,
+)
+from lobstr_hw.drivers.lighthouse.imu import RANGES, ImuRanges, parse_ranges
 from lobstr_hw.drivers.lighthouse.transport import NoAnswer, OpenDevice
 from lobstr_hw.drivers.lighthouse.usb_ids import DeviceKind
 from lobstr_hw.errors import FileFormatError
@@ -31,10 +37,8 @@ __all__ = [
     "start_reports",
 ]
 
-RANGES, VERSION, CONFIG_START, CONFIG_PIECE = 0x01, 0x05, 0x10, 0x11
+VERSION = 0x05
 DOWNLOAD_TRIES, RANGE_TRIES = 3, 5
-MOST_PIECES = 1_024
-"""Of a configuration; real ones have 60."""
 RADIO_SET_UP = bytes.fromhex("ff9610be5b325411cf8375538a086a5358d0b1")
 COMPACT_PROTOCOL = bytes.fromhex("ff8703000100")
 DONGLE_LIGHT = {

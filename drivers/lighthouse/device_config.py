@@ -24,9 +24,18 @@ from lobstr_hw.errors import FileFormatError
 from lobstr_hw.poses import Pose
 from lobstr_hw.rotations import Array
 
-__all__ = ["inflate_config", "join_pieces", "parse_config"]
+__all__ = [
+    "CONFIG_PIECE",
+    "CONFIG_START",
+    "MOST_PIECES",
+    "inflate_config",
+    "join_pieces",
+    "parse_config",
+]
 
-PIECE = 0x11
+CONFIG_START, CONFIG_PIECE = 0x10, 0x11
+MOST_PIECES = 1_024
+"""Of a configuration; real ones have 60."""
 ZLIB_START = 0x78
 LONGEST_JSON = 1 << 20
 """Bytes; real ones have 4 to 17 thousand."""
@@ -41,7 +50,9 @@ Json = dict[str, Any]
 
 def join_pieces(reports: Iterable[bytes]) -> bytes:
     """The compressed JSON, from feature reports 11 in their order."""
-    pieces = [data[2 : 2 + data[1]] for data in reports if len(data) > 2 and data[0] == PIECE]
+    pieces = [
+        data[2 : 2 + data[1]] for data in reports if len(data) > 2 and data[0] == CONFIG_PIECE
+    ]
     pieces = [piece for piece in pieces if piece]
     if pieces and pieces[0][0] != ZLIB_START:
         pieces = pieces[1:]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from lobstr_hw.drivers.lighthouse.angles import DeviceModel, ImuSamples, Ints
 
-__all__ = ["ImuRanges", "calibrate_imu", "parse_ranges"]
+__all__ = ["RANGES", "ImuRanges", "calibrate_imu", "parse_ranges"]
 
 FULL_SCALE = 32768
 RANGES = 0x01

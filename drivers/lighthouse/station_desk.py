@@ -137,8 +137,8 @@ class StationDesk:
             self._solving = None
             self._take_up(self._survey, self._solved)
 
-    def close(self, wait_s: float = 0.0) -> None:
-        """A solve that is running is left to itself; it holds nothing."""
+    def wait(self, wait_s: float) -> None:
+        """Wait for a solve that is running; it holds nothing, so nobody has to."""
         if self._solving is not None:
             self._solving.join(wait_s)
 

@@ -119,7 +119,7 @@ def hits_of(take: Take, view: View, R: Array) -> Hits:
 def _imu_around(take: Take, ticks: int) -> ImuSamples:
     around = int(2 * AROUND_S * TICKS_PER_S)
     k, n = np.searchsorted(take.imu.ticks, [ticks - around, ticks + around])
-    return ImuSamples(take.imu.ticks[k:n], take.imu.acc_g[k:n], take.imu.gyro_rad_s[k:n])
+    return take.imu.take(slice(k, n))
 
 
 def _view(

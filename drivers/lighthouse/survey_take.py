@@ -82,12 +82,12 @@ class SurveyTake:
         chunks = list(self._chunks)
         return Take(
             self.model,
-            _join_imu([chunk.imu for chunk in chunks]),
+            ImuSamples.join([chunk.imu for chunk in chunks]),
             join_angles([chunk.angles for chunk in chunks]),
         )
 
     def _close_chunk(self) -> bool:
-        imu, angles = _join_imu(self._imu), Angles.join(self._angles)
+        imu, angles = ImuSamples.join(self._imu), Angles.join(self._angles)
         self._imu, self._angles = [], []
         moving = _moves(imu)
         self._rests = 0 if moving else self._rests + 1
@@ -108,14 +108,6 @@ class SurveyTake:
             )
         )
         return True
-
-
-def _join_imu(parts: list[ImuSamples]) -> ImuSamples:
-    return ImuSamples(
-        np.concatenate([np.zeros(0, np.int64), *(part.ticks for part in parts)]),
-        np.concatenate([np.zeros((0, 3)), *(part.acc_g for part in parts)]),
-        np.concatenate([np.zeros((0, 3)), *(part.gyro_rad_s for part in parts)]),
-    )
 
 
 def _moves(imu: ImuSamples) -> bool:

@@ -18,7 +18,7 @@ from lobstr_hw.drivers.lighthouse.angles import DeviceModel
 from lobstr_hw.drivers.lighthouse.capture_clock import CaptureClock
 from lobstr_hw.drivers.lighthouse.capture_stream import LONGEST, open_capture
 from lobstr_hw.drivers.lighthouse.device_config import parse_config
-from lobstr_hw.drivers.lighthouse.imu import ImuRanges, parse_ranges
+from lobstr_hw.drivers.lighthouse.imu import RANGES, ImuRanges, parse_ranges
 from lobstr_hw.drivers.lighthouse.raw_events import EventLists
 from lobstr_hw.drivers.lighthouse.ticks import Ticks
 from lobstr_hw.errors import FileFormatError
@@ -26,7 +26,6 @@ from lobstr_hw.errors import FileFormatError
 __all__ = ["RecordedDevice", "read_survive_text"]
 
 CHUNK = 1 << 16
-RANGES = 0x01
 COUNTS = 6
 MOST_DEVICES = 64
 LARGEST = 1 << 31

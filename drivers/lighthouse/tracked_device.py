@@ -15,7 +15,6 @@ import numpy as np
 from lobstr_hw.drivers.lighthouse.angles import (
     TICKS_PER_S,
     DeviceModel,
-    ImuSamples,
     StationCalibration,
 )
 from lobstr_hw.drivers.lighthouse.decoding import Decoded, DeviceDecoder
@@ -147,6 +146,6 @@ def _pieces(decoded: Decoded) -> Iterator[Decoded]:
     i = j = 0
     for edge in edges:
         k, n = int(np.searchsorted(imu.ticks, edge)), int(np.searchsorted(angles.ticks, edge))
-        part = ImuSamples(imu.ticks[i:k], imu.acc_g[i:k], imu.gyro_rad_s[i:k])
+        part = imu.take(slice(i, k))
         yield Decoded(part, take_angles(angles, slice(j, n)), decoded.stations)
         i, j = k, n

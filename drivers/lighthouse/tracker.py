@@ -110,7 +110,7 @@ def _unbroken(
         return
     for i in np.split(new, gaps + 1):
         if len(i):
-            yield ImuSamples(imu.ticks[i], imu.acc_g[i], imu.gyro_rad_s[i])
+            yield imu.take(i)
 
 
 def _take_imu(state: TrackerState, imu: ImuSamples, settings: TrackerSettings) -> TrackerState:
@@ -118,11 +118,7 @@ def _take_imu(state: TrackerState, imu: ImuSamples, settings: TrackerSettings) -
     if len(old) and imu.ticks[0] - old.ticks[-1] > settings.lost_s * TICKS_PER_S:
         # nobody knows what it did meanwhile: as if it had just been switched on
         state = replace(begin(), given=state.given, angles=state.angles)
-    joined = ImuSamples(
-        np.concatenate([state.imu.ticks, imu.ticks]),
-        np.concatenate([state.imu.acc_g, imu.acc_g]),
-        np.concatenate([state.imu.gyro_rad_s, imu.gyro_rad_s]),
-    )
+    joined = ImuSamples.join([state.imu, imu])
     # windows lie at multiples of their length, wherever a recording begins
     first = int(joined.ticks[0]) // settings.window * settings.window
     return replace(state, imu=joined, window_end=max(state.window_end, first))
@@ -131,7 +127,7 @@ def _take_imu(state: TrackerState, imu: ImuSamples, settings: TrackerSettings) -
 def _reckon(state: TrackerState, f: FilterState, tail: FilterState | Tail, until: int) -> Track:
     """Dead reckoning from a sample's moment through those up to another."""
     i, j = np.searchsorted(state.imu.ticks, [tail.ticks, until + 1])
-    imu = ImuSamples(state.imu.ticks[i:j], state.imu.acc_g[i:j], state.imu.gyro_rad_s[i:j])
+    imu = state.imu.take(slice(i, j))
     return reckon(imu, tail.p, tail.v, tail.R, f.acc_bias, f.gyro_bias)
 
 
@@ -294,5 +290,5 @@ def _forget(
     light_since = end - int((settings.seed_s + 0.01) * TICKS_PER_S)
     i = int(np.searchsorted(state.imu.ticks, imu_since))
     j = int(np.searchsorted(state.angles.ticks, light_since))
-    imu = ImuSamples(state.imu.ticks[i:], state.imu.acc_g[i:], state.imu.gyro_rad_s[i:])
+    imu = state.imu.take(slice(i, None))
     return replace(state, imu=imu, angles=take_angles(state.angles, slice(j, None)), tail=tail)

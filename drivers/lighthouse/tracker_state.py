@@ -167,10 +167,6 @@ class TrackerState:
     rms_rad: float
 
 
-def _no_imu() -> ImuSamples:
-    return ImuSamples(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
-
-
 def _no_angles() -> Angles:
     none = np.zeros(0, np.int64)
     return Angles(none, none, none, none, np.zeros(0))
@@ -182,7 +178,7 @@ def begin() -> TrackerState:
     return TrackerState(
         filter=None,
         tail=None,
-        imu=_no_imu(),
+        imu=ImuSamples.join(()),
         angles=_no_angles(),
         window_end=never,
         given=never,

@@ -113,7 +113,7 @@ def _steps(takes: Sequence[Take], views: Sequence[View], guesses: Sequence[Guess
 def _between(take: Take, begin: int, end: int) -> tuple[ImuSamples, Ints]:
     i, j = np.searchsorted(take.imu.ticks, [begin, end])
     near = slice(max(int(i) - 1, 0), int(j) + 1)
-    imu = ImuSamples(take.imu.ticks[near], take.imu.acc_g[near], take.imu.gyro_rad_s[near])
+    imu = take.imu.take(near)
     inside = imu.ticks[(imu.ticks > begin) & (imu.ticks < end)]
     return imu, np.concatenate([[begin], inside, [end]])
 

@@ -1,14 +1,15 @@
 """The CSV of ``lobstr-log export`` -> a tracker log."""
 
 import csv
-import gzip
+import io
 import math
+import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 
+from lobstr_hw.drivers.lighthouse.capture_stream import open_capture
 from lobstr_hw.drivers.tracker_log import TrackerLogWriter
 from lobstr_hw.errors import FileFormatError
 from lobstr_hw.poses import PartialPose
@@ -19,23 +20,29 @@ from lobstr_hw.trackers import TrackerRole, TrackerSample, TrackingState
 
 __all__ = ["csv_samples", "import_csv"]
 
-GZIP_MAGIC = b"\x1f\x8b"
 BATCH = 500
 
 
 def import_csv(path: Path, out: Path, step: Step) -> Report:
     """Write the log of a CSV."""
-    with _opened(path) as lines, whole_file(out) as part:
-        rows = _write(part, csv_samples(lines, str(path)), step)
+    with whole_file(out) as part:
+        rows = _write(part, csv_samples(_lines(path), str(path)), step)
     document = {"file": str(out), "kind": "csv", "rows": rows}
     return Report(f"{out}: {rows} samples", document)
 
 
-def _opened(path: Path) -> IO[str]:
-    with path.open("rb") as file:
-        magic = file.read(len(GZIP_MAGIC))
-    opener = gzip.open if magic == GZIP_MAGIC else open
-    return opener(path, "rt", encoding="utf-8", errors="replace", newline="")
+def _lines(path: Path) -> Iterator[str]:
+    """A generator, so that errors of reading are told apart from those of writing."""
+    with (
+        open_capture(path) as stream,
+        io.TextIOWrapper(stream, encoding="utf-8", errors="replace", newline="") as lines,
+    ):
+        try:
+            yield from lines
+        except (EOFError, zlib.error) as error:
+            raise FileFormatError(
+                f"{path} is cut short or damaged. Unpack what is left of it, and import that."
+            ) from error
 
 
 def _write(path: Path, rows: Iterable[tuple[TrackerRole | None, TrackerSample]], step: Step) -> int:

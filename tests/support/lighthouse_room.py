@@ -225,7 +225,7 @@ def track(
     for since in range(int(imu.ticks[0]), int(imu.ticks[-1]) + chunk_ticks, chunk_ticks):
         i, j = np.searchsorted(imu.ticks, [since, since + chunk_ticks])
         k, n = np.searchsorted(angles.ticks, [since, since + chunk_ticks])
-        part = ImuSamples(imu.ticks[i:j], imu.acc_g[i:j], imu.gyro_rad_s[i:j])
+        part = imu.take(slice(i, j))
         light = take_angles(angles, slice(int(k), int(n)))
         state, batch = step(state, model, stations, part, light, settings)
         given.append(batch)

@@ -1,10 +1,12 @@
 """Laws of following a device by light and IMU, in a made-up room."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.lighthouse_room import Motion, carried, device, imu_of, light_of, room, still, track
 
-from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Angles, ImuSamples
+from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Angles
 from lobstr_hw.drivers.lighthouse.light import take_angles
 from lobstr_hw.drivers.lighthouse.tracker import Fix, PoseBatch
 from lobstr_hw.rotations import Array, geodesic_angle
@@ -135,9 +137,7 @@ def test_a_shaken_imu_that_loses_samples_does_not_carry_a_device_away(seed: int)
     shaken = ((t > 0.6) & (t < 1.1))[:, None]  # as by a motor: nothing of it moves the device
     acc = imu.acc_g + shaken * random.normal(scale=0.8, size=imu.acc_g.shape)
     heard = random.random(len(imu)) > 0.3 * shaken[:, 0]
-    poses = track(
-        model, stations, ImuSamples(imu.ticks[heard], acc[heard], imu.gyro_rad_s[heard]), light
-    )
+    poses = track(model, stations, replace(imu, acc_g=acc).take(heard), light)
     later = times(poses) > 0.3
     assert not np.any(poses.fix[later] == Fix.LOST)
     assert np.max(off_m(poses, motion)[later]) < 0.03
@@ -167,7 +167,7 @@ def test_an_imu_that_was_silent_spoils_nothing(silent_s: float) -> None:
     light = light_of(stations, model, motion, silent_s + 1.2, noise_rad=1e-4)
     t = (imu.ticks - FIRST) / TICKS_PER_S
     heard = (t < 0.6) | (t > 0.6 + silent_s)
-    imu = ImuSamples(imu.ticks[heard], imu.acc_g[heard], imu.gyro_rad_s[heard])
+    imu = imu.take(heard)
     poses = track(model, stations, imu, without(light, 0.6, 0.6 + silent_s))
     followed = (poses.fix != Fix.LOST) & (np.abs(times(poses) - 0.7) < 2.0)
     assert np.max(off_m(poses, motion)[followed & (times(poses) > 0.3)]) < 0.02

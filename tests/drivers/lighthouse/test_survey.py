@@ -17,7 +17,7 @@ from support.lighthouse_devices import named
 from support.lighthouse_room import Motion, carried, imu_of, light_of, room, still
 
 from lobstr_hw.drivers.lighthouse import station_desk, survey_take
-from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Angles, ImuSamples
+from lobstr_hw.drivers.lighthouse.angles import TICKS_PER_S, Angles
 from lobstr_hw.drivers.lighthouse.decoding import Decoded
 from lobstr_hw.drivers.lighthouse.keep_known import keep_known
 from lobstr_hw.drivers.lighthouse.light import Station, take_angles
@@ -47,7 +47,7 @@ def batches(
     for a, b in pairwise(edges.tolist()):
         i, j = np.searchsorted(imu.ticks, [a, b])
         k, n = np.searchsorted(light.ticks, [a, b])
-        part = ImuSamples(imu.ticks[i:j], imu.acc_g[i:j], imu.gyro_rad_s[i:j])
+        part = imu.take(slice(i, j))
         parts.append(Decoded(part, take_angles(light, slice(int(k), int(n))), {}))
     return parts
 
@@ -89,7 +89,7 @@ class Room:
         for batch in batches(carried(seed), seconds, stations=self.truth):
             self.desk.see(TRACKER.serial, TRACKER, batch)
             self.desk.work()
-            self.desk.close(5.0)
+            self.desk.wait(5.0)
         self.desk.work()
 
 

@@ -308,6 +308,18 @@ class TestImport:
         assert "line 3" in err and why in err
         assert not (tmp_path / "a.mcap").exists()
 
+    def test_a_packed_table_that_is_cut_is_told(
+        self, made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        table, zipped = tmp_path / "a.csv", tmp_path / "a.csv.gz"
+        main(["export", str(made), "--csv", str(table)])
+        content = gzip.compress(table.read_bytes())
+        zipped.write_bytes(content[: len(content) // 2])
+        capsys.readouterr()
+        assert main(["import", str(zipped), str(tmp_path / "b.mcap")]) == 1
+        assert "a.csv.gz is cut short or damaged. Unpack" in capsys.readouterr().err
+        assert not (tmp_path / "b.mcap").exists()
+
     @pytest.mark.parametrize("name", ["b.csv", "b.mcap", "missing.pcap"])
     def test_a_recording_named_last_is_not_written_over(
         self, made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
