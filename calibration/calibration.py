@@ -22,7 +22,7 @@ class Residuals:
     Attributes:
         spread_m, spread_rad: how far the stillest window wandered.
         heading_disagreement_rad: of the headset against the line between the hands.
-        misfit: of the measures, in deviations; above 2 something is odd.
+        misfit: of the measures, in deviations; the self-check refuses more than 1.8.
         hips_height_deviation_m, arm_deviation_m: how far off these may be.
     """
 

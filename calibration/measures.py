@@ -72,7 +72,8 @@ class Measures:
         leg: of the hips' height, by what share it is off that of people of this stature.
         hips_height_deviation_m: how far off the hips' height may be.
         arm_deviation_m: how far off the arms may be.
-        misfit: root mean square of all residuals over their deviations; above 2 something is odd.
+        misfit: root mean square of all residuals over their deviations; the self-check refuses
+            more than 1.8.
     """
 
     stature_m: float

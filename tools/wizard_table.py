@@ -129,7 +129,12 @@ def _good(outcomes: list[Outcome]) -> list[str]:
                 f"| {name} | {np.median(values):.2f} / {np.percentile(values, 95.0):.2f} | "
                 f"{wanted} |"
             )
-    return rows
+    missed = [
+        name
+        for i, (name, _, wanted) in enumerate(ROWS)
+        if wanted and np.median([o.errors[i] for o in done]) > float(wanted)
+    ]
+    return [*rows, "", f"Over what is wanted, in the median: {', '.join(missed) or 'none'}."]
 
 
 def _times(seconds: list[float]) -> str:
