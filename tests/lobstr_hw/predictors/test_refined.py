@@ -78,7 +78,7 @@ def shown_toes(predictor: Predictor, taken: list[Frame]) -> Array:
     return np.array(out)
 
 
-def test_it_begins_as_live_and_goes_over_to_the_mean_of_both(
+def test_the_mean_of_both_is_said_from_the_first_frame_on(
     live: Lobstr, two_way: TwoWay, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     taken = frames(6.0)
@@ -86,14 +86,25 @@ def test_it_begins_as_live_and_goes_over_to_the_mean_of_both(
     mean = said_toes(refined(taken, live, two_way), taken)
     monkeypatch.setattr("lobstr_hw.predictors.refined.TWO_WAY_SHARE", 1.0)
     alone = said_toes(refined(taken, live, two_way), taken)
-    np.testing.assert_allclose(mean[0], as_live[0], atol=1e-5)
-    inside = round(BLEND_S * RATE_HZ) + 1
-    expected = TWO_WAY_SHARE * alone[inside:] + (1.0 - TWO_WAY_SHARE) * as_live[inside:]
-    off = np.linalg.norm(mean[inside:] - as_live[inside:], axis=-1).max()
+    expected = TWO_WAY_SHARE * alone + (1.0 - TWO_WAY_SHARE) * as_live
+    off = np.linalg.norm(mean - as_live, axis=-1)
     # the mean of rotations is nearly that of the toes
-    assert np.linalg.norm(mean[inside:] - expected, axis=-1).max() < 0.1 * off
-    steps = np.linalg.norm(np.diff((mean - as_live)[:inside], axis=0), axis=-1)
-    assert steps.max() < 0.3 * off, "bit by bit"
+    wrong = np.linalg.norm(mean - expected, axis=-1)
+    assert wrong.max() < 0.1 * off.max()
+    assert wrong[0].max() < 0.1 * off[0].max(), "nothing was shown before that it could jump from"
+
+
+def test_after_a_loss_it_goes_over_to_the_mean_of_both_bit_by_bit(
+    live: Lobstr, two_way: TwoWay
+) -> None:
+    taken = lost(frames(8.0), 60, 160)
+    as_live, mean = (said_toes(p, taken) for p in (live, refined(taken, live, two_way)))
+    inside = 160 + round(BLEND_S * RATE_HZ) + 1
+    off = np.linalg.norm(mean - as_live, axis=-1).max(axis=-1)
+    np.testing.assert_allclose(mean[160], as_live[160], atol=1e-5)
+    assert off[inside:].max() > 0.01
+    steps = np.linalg.norm(np.diff((mean - as_live)[160:inside], axis=0), axis=-1)
+    assert steps.max() < 0.3 * off[160:].max()
 
 
 def test_a_long_loss_is_left_to_the_live_network_and_a_short_one_is_not(
