@@ -10,24 +10,25 @@ falls into one row of each table; none is hidden in a mean.
 import argparse
 import datetime
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from results_page import write_section
+from split_clips import part_motions
 
 from lobstr_hw.evaluation.activities import Activity, activities
 from lobstr_hw.evaluation.after_ik import Shown, show
 from lobstr_hw.evaluation.metrics import network_legs
 from lobstr_hw.evaluation.rollout import Rollout, roll_out
 from lobstr_hw.evaluation.truth import Truth
+from lobstr_hw.motion import Motion
 from lobstr_hw.predictors import Predictor, load_predictor
 from lobstr_hw.predictors.predictor import Bools
-from lobstr_hw.retargeting import ClipFile, find_clips, retarget
+from lobstr_hw.retargeting import find_clips, retarget
 from lobstr_hw.rotations import Array, geodesic_angle
-from lobstr_hw.splits import clip_name, default_split
 
 TITLE = "## What people do"
 PARTS = {"test": "People nobody trained on", "test_same_actor": "Held-out clips of known people"}
@@ -89,28 +90,21 @@ def _sections(args: argparse.Namespace) -> Iterator[str]:
     predictors = [load_predictor(args.predictor), load_predictor(args.against)]
     means, delays = {}, {}
     for part, title in PARTS.items():
-        clips = _part(args.data, part)
+        clips = _clips(part_motions(args.data, part))
         errors = [_errors(p, clips) for p in predictors]
         yield f"### {title}, by activity (`{part}`)\n\n{_table(clips, *errors)}\n"
         means[title] = [float(e.toes_cm.mean()) for e in errors]
         delays[title] = [e.delays_ms for e in errors]
     yield f"### The first step after standing still\n\n{_delay_table(args, delays)}\n"
     if args.other_studio:
-        clips = _clips(find_clips(args.other_studio))
+        clips = _clips(retarget(find_clips(args.other_studio)))
         means["Another studio"] = [float(_errors(p, clips).toes_cm.mean()) for p in predictors]
         yield f"### Another studio\n\n{_studio_table(args, clips, means)}\n"
 
 
-def _part(data: Path, part: str) -> list[Clip]:
-    wanted = default_split().parts[part]
-    sets = {name.split("/")[0] for name in wanted}
-    found = [clip for clip in find_clips([data]) if clip.set_name in sets]
-    return [clip for clip in _clips(found) if clip_name(clip.truth.name) in wanted]
-
-
-def _clips(found: Sequence[ClipFile]) -> list[Clip]:
+def _clips(motions: Iterable[Motion]) -> list[Clip]:
     out = []
-    for motion in retarget(found):
+    for motion in motions:
         truth = Truth.of(motion)
         if len(truth) > NOT_SCORED + 2:
             out.append(Clip(truth, motion.subject, activities(truth)))

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from predictor_results import truths
+from split_clips import truths
 
 from lobstr_hw.evaluation.activities import Activity, activities
 from lobstr_hw.evaluation.after_ik import Shown, show

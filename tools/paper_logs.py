@@ -14,6 +14,7 @@ import numpy.typing as npt
 from made_takes import calibrated, first_seconds
 from paper_rows import Trained
 from paper_scores import legs_of
+from split_clips import motions_named
 
 from lobstr_hw.evaluation.activities import activities
 from lobstr_hw.evaluation.truth import Truth
@@ -27,11 +28,9 @@ from lobstr_hw.features import (
 )
 from lobstr_hw.lower_body import toes_in_reference, true_lower_body
 from lobstr_hw.motion import Motion
-from lobstr_hw.retargeting import find_clips, retarget
 from lobstr_hw.rotations import Array, geodesic_angle
 from lobstr_hw.simulation import SimulatedTake, simulate
 from lobstr_hw.skeleton import Joint, local_rotations
-from lobstr_hw.splits import clip_name
 from lobstr_hw.trackers import FOUR_POINTS, ROLE_JOINT
 from lobstr_hw.training.windowed import windowed
 
@@ -106,9 +105,7 @@ class Scored:
 
 def motions(data: Path) -> list[Motion]:
     """The first seconds of each clip."""
-    sets = {name.split("/")[0] for name in CLIPS}
-    found = [clip for clip in find_clips([data]) if clip.set_name in sets]
-    return [first_seconds(m, LONGEST_S) for m in retarget(found) if clip_name(m.name) in CLIPS]
+    return [first_seconds(motion, LONGEST_S) for motion in motions_named(data, CLIPS)]
 
 
 def recordings(clips: Sequence[Motion], stature_cm: int, seed: int) -> list[Worn]:

@@ -21,9 +21,7 @@ from lobstr_hw.evaluation.truth import Truth
 from lobstr_hw.features import POINT_ROLES, clip_features, clip_points, input_size
 from lobstr_hw.predictors.lobstr import prediction_from_6d
 from lobstr_hw.predictors.weights import load_network
-from lobstr_hw.retargeting import find_clips, retarget
 from lobstr_hw.rotations import Array
-from lobstr_hw.splits import clip_name, default_split
 from lobstr_hw.trackers import FOUR_POINTS
 from lobstr_hw.training.config import STEPPED_KINDS
 from lobstr_hw.training.export import export_network
@@ -40,14 +38,6 @@ class Cost:
 
     window_ms: float
     step_ms: float | None
-
-
-def clips_of(data: Path, part: str) -> list[Truth]:
-    """The clips of a part, as lobstr-evaluate has them."""
-    wanted = default_split().parts[part]
-    sets = {name.split("/")[0] for name in wanted}
-    found = [clip for clip in find_clips([data]) if clip.set_name in sets]
-    return [Truth.of(motion) for motion in retarget(found) if clip_name(motion.name) in wanted]
 
 
 def scores(

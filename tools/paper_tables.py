@@ -21,8 +21,9 @@ from pathlib import Path
 import torch
 from paper_logs import CLIPS, LONGEST_S, STATURES_CM, Scored, Worn, motions, recordings, scored
 from paper_rows import SETTINGS, TABLES, WHOLE, Trained, train_missing, trained
-from paper_scores import clips_of, cost_of, scores
+from paper_scores import cost_of, scores
 from results_page import write_section
+from split_clips import truths
 
 from lobstr_hw.evaluation.activities import Activity
 from lobstr_hw.evaluation.metrics import Scores
@@ -81,7 +82,7 @@ class Sources:
 @cache
 def _clips(data: Path, part: str) -> list[Truth]:
     _say(f"reading {part}")
-    return clips_of(data, part)
+    return list(truths(data, part))
 
 
 @cache

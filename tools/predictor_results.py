@@ -9,22 +9,19 @@ is there is not made again. With --write the section is put into the page, else 
 import argparse
 import json
 import sys
-from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 from results_page import write_section
+from split_clips import truths
 
 from lobstr_hw.evaluation.evaluate import evaluate
 from lobstr_hw.evaluation.rollout import Mode
 from lobstr_hw.evaluation.tables import document, markdown_table
-from lobstr_hw.evaluation.truth import Truth
 from lobstr_hw.predictors import SHIPPED_WEIGHTS, Predictor, load_predictor
 from lobstr_hw.predictors.trivial import mean_pose, standing
 from lobstr_hw.predictors.weights import read_card
-from lobstr_hw.retargeting import find_clips, retarget
-from lobstr_hw.splits import clip_name, default_split
 
 PARTS = {
     "test": "People nobody trained on",
@@ -85,16 +82,6 @@ def _measure(options: argparse.Namespace, part: str) -> None:
 
 def _path(out: Path, part: str, row: str) -> Path:
     return out / f"{part}-{row}.json"
-
-
-def truths(data: Path, part: str) -> Iterator[Truth]:
-    """As lobstr-evaluate has them."""
-    found = find_clips([data])
-    wanted = default_split().parts[part]
-    sets = {name.split("/")[0] for name in wanted}
-    for motion in retarget([clip for clip in found if clip.set_name in sets]):
-        if clip_name(motion.name) in wanted:
-            yield Truth.of(motion)
 
 
 def _predictor(weights: Path, row: str) -> Predictor:

@@ -19,8 +19,9 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from predictor_results import PARTS, truths
+from predictor_results import PARTS
 from results_page import write_section
+from split_clips import truths
 
 from lobstr_hw.drivers.tracker_log import TrackerLogWriter, read_log
 from lobstr_hw.evaluation.at_once import roll_out_at_once
