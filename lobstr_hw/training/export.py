@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 import onnx
 import torch
-from onnx import TensorProto, helper, numpy_helper
 
 from lobstr_hw.errors import ModelError
 from lobstr_hw.lower_body import POSE_SIZE
@@ -21,16 +20,13 @@ from lobstr_hw.predictors.weights import NetworkCard, load_network, write_card
 from lobstr_hw.training.config import STEPPED_KINDS
 from lobstr_hw.training.mirrored import MirrorMean, mirror_matrices, mirror_nodes
 from lobstr_hw.training.network import CONTACT_SIZE, LobstrNetwork
+from lobstr_hw.training.onnx_graph import graph_model, value
 from lobstr_hw.training.step_graphs import step_nodes
 
 __all__ = ["ExportError", "export_network", "measure_export", "stored"]
 
 Float32 = npt.NDArray[np.float32]
 Stepped = TypeVar("Stepped", LobstrNetwork, MirrorMean)
-
-OPSET = 17
-IR_VERSION = 8
-"""Old enough for every onnxruntime this project supports."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,26 +99,20 @@ def _model(network: LobstrNetwork | MirrorMean) -> onnx.ModelProto:
     else:
         weights = _weights(network)
     matrices = [k for k, w in weights.items() if w.ndim > 1]
-    arrays = {k: w for k, w in weights.items() if w.ndim == 1}
-    arrays |= {k + "_16": weights[k].astype(np.float16) for k in matrices}
-    arrays |= {"one": np.array(1.0, dtype=np.float32), "half": np.array(0.5, dtype=np.float32)}
-    casts = [helper.make_node("Cast", [k + "_16"], [k], to=TensorProto.FLOAT) for k in matrices]
     state = network.state_size
-    graph = helper.make_graph(
-        [*casts, *nodes],
+    return graph_model(
         "lobstr_step",
-        [_value("x", len(weights["W_x"])), _value("h", state)],
-        [_value("h_next", state), _value("pose", POSE_SIZE), _value("contact", CONTACT_SIZE)],
-        [numpy_helper.from_array(array, k) for k, array in arrays.items()],
+        nodes,
+        [value("x", "n", len(weights["W_x"])), value("h", "n", state)],
+        [
+            value("h_next", "n", state),
+            value("pose", "n", POSE_SIZE),
+            value("contact", "n", CONTACT_SIZE),
+        ],
+        weights,
+        matrices,
+        {"one": np.array(1.0, dtype=np.float32), "half": np.array(0.5, dtype=np.float32)},
     )
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)])
-    model.ir_version = IR_VERSION
-    onnx.checker.check_model(model)
-    return model
-
-
-def _value(name: str, size: int) -> onnx.ValueInfoProto:
-    return helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", size])
 
 
 def _weights(network: LobstrNetwork) -> dict[str, Float32]:

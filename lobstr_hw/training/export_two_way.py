@@ -1,21 +1,19 @@
 """The two-way network as one graph over all frames: NAME.onnx and NAME.json."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import onnx
 import torch
-from onnx import TensorProto, helper, numpy_helper
 from torch import Tensor
 
 from lobstr_hw.features import INPUT_SIZE
 from lobstr_hw.lower_body import POSE_SIZE
 from lobstr_hw.predictors.two_way import Float32, load_two_way
 from lobstr_hw.predictors.weights import NetworkCard, write_card
-from lobstr_hw.training.export import IR_VERSION, OPSET, ExportError
+from lobstr_hw.training.export import ExportError
 from lobstr_hw.training.network import CONTACT_SIZE
+from lobstr_hw.training.onnx_graph import graph_model, node, value
 from lobstr_hw.training.two_way_network import TwoWayNetwork
 
 __all__ = ["export_two_way", "measure_two_way_export"]
@@ -50,25 +48,15 @@ def measure_two_way_export(network: TwoWayNetwork, path: Path, frames: int = 200
 def _model(network: TwoWayNetwork) -> onnx.ModelProto:
     weights = _weights(network)
     matrices = [k for k in weights if k.startswith("W_")]
-    arrays: dict[str, npt.NDArray[Any]] = {k: w for k, w in weights.items() if k not in matrices}
-    arrays |= {k + "_16": weights[k].astype(np.float16) for k in matrices}
-    arrays["frames_n_rest"] = np.array([0, 0, -1], dtype=np.int64)
-    casts = [helper.make_node("Cast", [k + "_16"], [k], to=TensorProto.FLOAT) for k in matrices]
-    graph = helper.make_graph(
-        [*casts, *_nodes(network.gru.hidden_size)],
+    return graph_model(
         "lobstr_two_way",
-        [_value("x", INPUT_SIZE)],
-        [_value("pose", POSE_SIZE), _value("contact", CONTACT_SIZE)],
-        [numpy_helper.from_array(array, k) for k, array in arrays.items()],
+        _nodes(network.gru.hidden_size),
+        [value("x", "frames", "n", INPUT_SIZE)],
+        [value("pose", "frames", "n", POSE_SIZE), value("contact", "frames", "n", CONTACT_SIZE)],
+        weights,
+        matrices,
+        {"frames_n_rest": np.array([0, 0, -1], dtype=np.int64)},
     )
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)])
-    model.ir_version = IR_VERSION
-    onnx.checker.check_model(model)
-    return model
-
-
-def _value(name: str, size: int) -> onnx.ValueInfoProto:
-    return helper.make_tensor_value_info(name, TensorProto.FLOAT, ["frames", "n", size])
 
 
 def _weights(network: TwoWayNetwork) -> dict[str, Float32]:
@@ -100,9 +88,6 @@ def _zrn(rows: Tensor) -> Tensor:
 
 
 def _nodes(hidden_size: int) -> list[onnx.NodeProto]:
-    def node(op: str, inputs: str, *outputs: str, **attributes: Any) -> onnx.NodeProto:
-        return helper.make_node(op, inputs.split(), outputs, **attributes)
-
     gru = {"hidden_size": hidden_size, "direction": "bidirectional", "linear_before_reset": 1}
     return [
         node("GRU", "x W_x W_h b", "ways", **gru),

@@ -4,17 +4,16 @@ One set of weights, two states. At batch 1 a step's time goes into reading the w
 second answer costs little; what it takes away is what one side of the body has learnt by chance.
 """
 
-from typing import Any
-
 import numpy as np
 import torch
-from onnx import NodeProto, helper
+from onnx import NodeProto
 from torch import Tensor, nn
 
 from lobstr_hw.features import mirror_features
 from lobstr_hw.lower_body import POSE_SIZE, mirror_pose_6d
 from lobstr_hw.training.config import TrainingConfig
 from lobstr_hw.training.network import LobstrNetwork
+from lobstr_hw.training.onnx_graph import node
 
 __all__ = ["MirrorMean", "mirror_matrices", "mirror_nodes", "shipped"]
 
@@ -67,17 +66,17 @@ _INNER = ("x", "h", "h_next", "pose", "contact")
 
 def mirror_nodes(step: list[NodeProto]) -> list[NodeProto]:
     """The step of a network around which both sides' rows are put together and parted again."""
-    for node in step:
-        for names in (node.input, node.output):
+    for inner in step:
+        for names in (inner.input, inner.output):
             names[:] = [f"both_{name}" if name in _INNER else name for name in names]
     return [
-        _node("MatMul", "x mirror_x", "x_mirrored"),
-        _node("Concat", "x x_mirrored", "both_x", axis=0),
-        _node("Split", "h", "h_here h_mirrored", axis=1),
-        _node("Concat", "h_here h_mirrored", "both_h", axis=0),
+        node("MatMul", "x mirror_x", "x_mirrored"),
+        node("Concat", "x x_mirrored", "both_x", axis=0),
+        node("Split", "h", "h_here h_mirrored", axis=1),
+        node("Concat", "h_here h_mirrored", "both_h", axis=0),
         *step,
-        _node("Split", "both_h_next", "h_next_here h_next_mirrored", axis=0),
-        _node("Concat", "h_next_here h_next_mirrored", "h_next", axis=1),
+        node("Split", "both_h_next", "h_next_here h_next_mirrored", axis=0),
+        node("Concat", "h_next_here h_next_mirrored", "h_next", axis=1),
         *_mean("pose"),
         *_mean("contact"),
     ]
@@ -85,12 +84,8 @@ def mirror_nodes(step: list[NodeProto]) -> list[NodeProto]:
 
 def _mean(name: str) -> list[NodeProto]:
     return [
-        _node("Split", f"both_{name}", f"{name}_here {name}_there", axis=0),
-        _node("MatMul", f"{name}_there mirror_{name}", f"{name}_back"),
-        _node("Add", f"{name}_here {name}_back", f"{name}_sum"),
-        _node("Mul", f"{name}_sum half", name),
+        node("Split", f"both_{name}", f"{name}_here {name}_there", axis=0),
+        node("MatMul", f"{name}_there mirror_{name}", f"{name}_back"),
+        node("Add", f"{name}_here {name}_back", f"{name}_sum"),
+        node("Mul", f"{name}_sum half", name),
     ]
-
-
-def _node(op: str, inputs: str, outputs: str, **attributes: Any) -> NodeProto:
-    return helper.make_node(op, inputs.split(), outputs.split(), **attributes)
