@@ -6,7 +6,7 @@ from lobstr_hw.ik import solve_two_bone
 from lobstr_hw.rotations import Array, rotation_between
 from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint
 
-__all__ = ["LEGS", "plant", "rotations_to_ankles"]
+__all__ = ["LEGS", "plant", "rotations_to_ankles", "sockets"]
 
 LEGS = np.array(
     [
@@ -27,7 +27,7 @@ def plant(p_hips: Array, R_hips: Array, p_ankles: Array, bend_m: Array | float =
     A leg that has just come straight stops its knee at once. ``bend_m`` (...) rounds that off: so
     far the hips keep from the height at which a leg is straight.
     """
-    arm = p_ankles - (p_hips[..., None, :] + _turned(R_hips))
+    arm = p_ankles - sockets(p_hips, R_hips)
     level = np.hypot(arm[..., 0], arm[..., 2])
     highest = np.sqrt(np.maximum((_THIGH + _SHIN) ** 2 - level**2, 0.0))
     missing = np.max(-arm[..., 1] - highest, axis=-1) + bend_m
@@ -44,7 +44,7 @@ def rotations_to_ankles(p_hips: Array, R_hips: Array, p_ankles: Array, like: Arr
         p_ankles: (..., 2, 3); one out of reach is pointed at.
         like: (..., 2, 2, 3, 3) legs that these should resemble; knees bend as theirs do.
     """
-    socket = p_hips[..., None, :] + _turned(R_hips)
+    socket = sockets(p_hips, R_hips)
     # the knee is a hinge about X: it stands off the line to the ankle at right angles to both
     pole = np.cross(p_ankles - socket, like[..., 0, :, 0])
     knee = solve_two_bone(socket, p_ankles, _THIGH, _SHIN, pole)
@@ -53,5 +53,7 @@ def rotations_to_ankles(p_hips: Array, R_hips: Array, p_ankles: Array, like: Arr
     return np.asarray(rotation_between(like[..., :, 1], up) @ like)
 
 
-def _turned(R_hips: Array) -> Array:
-    return np.asarray((R_hips[..., None, :, :] @ _SOCKETS[..., None])[..., 0])
+def sockets(p_hips: Array, R_hips: Array) -> Array:
+    """Both hip joints (..., 2, 3) in the world."""
+    turned = (R_hips[..., None, :, :] @ _SOCKETS[..., None])[..., 0]
+    return np.asarray(p_hips[..., None, :] + turned)

@@ -6,7 +6,7 @@ training, and the weights that were best there are the ones that are exported.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -24,14 +24,13 @@ from lobstr_hw.training.carried_losses import (
 from lobstr_hw.training.checkpoint import Carried, Run
 from lobstr_hw.training.config import TrainingConfig
 from lobstr_hw.training.dataset import RATE_HZ, Clips
-from lobstr_hw.training.devices import device_of, precision_of
 from lobstr_hw.training.episodes import EpisodeSource
 from lobstr_hw.training.kinematics import rotations_from_6d, toes_in_reference
 from lobstr_hw.training.mirrored import shipped
-from lobstr_hw.training.network import LobstrNetwork
-from lobstr_hw.training.recurrence import run_gru
+from lobstr_hw.training.precision import over_chunk
 from lobstr_hw.training.schedule import set_learning_rate
 from lobstr_hw.training.streams import Chunk, Position, Streams
+from lobstr_hw.training.teachers import Teachers
 
 __all__ = ["WholeClip", "held_out_clips", "keep_best", "train_carried", "validate_carried"]
 
@@ -43,13 +42,15 @@ def train_carried(
     run: Run, clips: Clips, validation: Clips | None, config: TrainingConfig
 ) -> Iterator[Run]:
     """Go on until ``config.steps``, giving the run after each step; it changes in place."""
+    teachers = Teachers(config)
     if run.carried is None:
         hidden = torch.zeros(1, config.batch, config.hidden_size)
-        run.carried = Carried(hidden, Position.start(config.batch))
+        taught = torch.zeros(1, config.batch, teachers.state_size)
+        run.carried = Carried(hidden, taught, Position.start(config.batch))
     streams = Streams(EpisodeSource(clips, config), config, run.carried.position)
     held_out = [] if validation is None else held_out_clips(validation, run, config)
     while run.step < config.steps:
-        run.curve.append(_train_step(run, streams, config))
+        run.curve.append(_train_step(run, streams, teachers, config))
         run.step += 1
         add_to_average(run, config)
         due = run.step % config.validate_every == 0 or run.step == config.steps
@@ -67,37 +68,34 @@ def keep_best(run: Run, row: list[float]) -> None:
     run.validation.append(row)
 
 
-def _train_step(run: Run, streams: Streams, config: TrainingConfig) -> list[float]:
+def _train_step(
+    run: Run, streams: Streams, teachers: Teachers, config: TrainingConfig
+) -> list[float]:
     """One chunk of every stream; returns a row of the curve."""
     if run.carried is None:
         raise AssertionError("the state is there from the first step on")
     chunk = streams.next_chunk()
     rate = set_learning_rate(run.optimizer, config, run.step)
     run.network.train()
-    hidden = run.carried.hidden * torch.from_numpy(~chunk.first)[None, :, None]
+    goes_on = torch.from_numpy(~chunk.first)[None, :, None]
     x = torch.from_numpy((chunk.x - run.stats.input_mean) / run.stats.input_scale)
-    pose, logits, hidden = _through(run.network, x, hidden, config)
-    terms = carried_losses(pose, logits, _targets(chunk, config), config.weights)
+    pose, logits, hidden = over_chunk(run.network, x, run.carried.hidden * goes_on, config)
+    truth = _targets(chunk, config)
+    terms = carried_losses(pose, logits, truth, config.weights)
+    total, taught = terms.total, run.carried.taught
+    if config.teachers:
+        said, sure, taught = teachers.say(chunk.x, taught * goes_on)
+        heard = carried_losses(
+            pose, logits, replace(truth, pose=said, contact=sure), config.weights
+        )
+        total = torch.lerp(total, heard.total, config.taught)
     run.optimizer.zero_grad(set_to_none=True)
-    terms.total.backward()  # type: ignore[no-untyped-call]
+    total.backward()  # type: ignore[no-untyped-call]
     torch.nn.utils.clip_grad_norm_(run.network.parameters(), config.carried.gradient_norm)
     run.optimizer.step()
-    run.carried = Carried(hidden.detach().float(), streams.position)
-    values = (terms.total, terms.pose, terms.toe, terms.velocity, terms.contact)
+    run.carried = Carried(hidden.detach().float(), taught, streams.position)
+    values = (total, terms.pose, terms.toe, terms.velocity, terms.contact)
     return [run.step + 1.0, *(float(v.detach()) for v in values), rate]
-
-
-def _through(
-    network: LobstrNetwork, x: Tensor, hidden: Tensor, config: TrainingConfig
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Pose, logits and the last state of a chunk, in the precision of the settings."""
-    gru = network.encoder
-    if config.precision == "bf16" and isinstance(gru, nn.GRU) and device_of(config).type == "cpu":
-        encoded, hidden = run_gru(gru, x, hidden)
-        return *network.heads(encoded), hidden
-    with precision_of(config):
-        pose, logits, hidden = network(x, hidden, last_only=False)
-    return pose, logits, hidden
 
 
 def _targets(chunk: Chunk, config: TrainingConfig) -> ChunkTargets:

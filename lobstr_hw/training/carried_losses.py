@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor
-from torch.nn.functional import cross_entropy
+from torch.nn.functional import binary_cross_entropy_with_logits
 
 from lobstr_hw.training.config import LossWeights
 from lobstr_hw.training.kinematics import leg_points_in_reference
@@ -19,7 +19,7 @@ class ChunkTargets:
 
     Attributes:
         pose: (n, frames, 48).
-        contact: (n, frames, 2) 0 or 1, integers.
+        contact: (n, frames, 2) 0 or 1, or a teacher's probability.
         yaw: (n, frames) of the reference frame.
         counted: (n, frames) 1 where there is a loss, else 0.
     """
@@ -73,5 +73,6 @@ def _mean(values: Tensor, counted: Tensor) -> Tensor:
 
 def _cross_entropy(logits: Tensor, contact: Tensor) -> Tensor:
     """(n, frames), the mean of both feet."""
-    flat = cross_entropy(logits.reshape(-1, 2), contact.reshape(-1), reduction="none")
-    return flat.reshape(contact.shape).mean(-1)
+    off, on = logits.reshape(*contact.shape, 2).unbind(-1)
+    # a softmax of two is a logistic of their difference
+    return binary_cross_entropy_with_logits(on - off, contact.float(), reduction="none").mean(-1)

@@ -21,7 +21,14 @@ from lobstr_hw.training.network import LobstrNetwork
 from lobstr_hw.training.streams import Position
 from lobstr_hw.training.two_way_network import TwoWayNetwork
 
-__all__ = ["Carried", "Run", "load_checkpoint", "new_run", "save_checkpoint"]
+__all__ = [
+    "Carried",
+    "Run",
+    "finished_weights",
+    "load_checkpoint",
+    "new_run",
+    "save_checkpoint",
+]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,10 +37,12 @@ class Carried:
 
     Attributes:
         hidden: (1, streams, H) after the last chunk.
+        taught: (1, streams, sum of 2 H) the teachers' states, of no numbers where there are none.
         position: of the streams.
     """
 
     hidden: torch.Tensor
+    taught: torch.Tensor
     position: Position
 
 
@@ -71,6 +80,11 @@ def new_run(config: TrainingConfig, stats: Statistics) -> Run:
     torch.manual_seed(config.seed)
     network = _network(config, torch.from_numpy(stats.output_mean)).to(device_of(config))
     return Run(network, torch.optim.Adam(network.parameters(), lr=config.learning_rate), stats)
+
+
+def finished_weights(run: Run) -> dict[str, torch.Tensor]:
+    """Those that were best in validation, where the run kept them; else the mean ones, or all."""
+    return run.best or run.average or run.network.state_dict()
 
 
 def _network(config: TrainingConfig, output_mean: torch.Tensor) -> LobstrNetwork:
@@ -138,6 +152,7 @@ def load_checkpoint(path: Path, config: TrainingConfig) -> Run:
 def _carried_tensors(carried: Carried) -> dict[str, torch.Tensor]:
     return {
         "hidden": carried.hidden,
+        "taught": carried.taught,
         "episode": torch.from_numpy(carried.position.episode),
         "chunk": torch.from_numpy(carried.position.chunk),
     }
@@ -147,4 +162,4 @@ def _carried_of(document: dict[str, torch.Tensor] | None) -> Carried | None:
     if document is None:
         return None
     position = Position(document["episode"].numpy(), document["chunk"].numpy())
-    return Carried(document["hidden"], position)
+    return Carried(document["hidden"], document["taught"], position)

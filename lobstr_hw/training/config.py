@@ -62,6 +62,7 @@ class CarriedSettings:
             down at the hips, for their height is what calibration scales by, and a network that
             saw it err would not believe it (measured: toes 3 cm too low in whoever stands low).
         dropout_share: of the episodes in which one role is lost for a while.
+        sitting_share: of the episodes in which who only stands sits down now and then.
         gradient_norm: longer gradients are cut; a carried state can explode.
     """
 
@@ -75,6 +76,7 @@ class CarriedSettings:
     warp_max: float = 1.45
     lever_m: float = 0.02
     dropout_share: float = 0.1
+    sitting_share: float = 0.0
     gradient_norm: float = 1.0
 
 
@@ -85,7 +87,6 @@ class TwoWaySettings:
     Attributes:
         planted: weight of the velocity term once more, over feet that stand: what they do wrong
             there is skate.
-        cool_down: last steps, over which the learning rate falls to a tenth of what it would be.
         margin: frames at a chunk's end that are not scored, where the recording goes on beyond it.
         end_share: of the chunks' ends that stand for a recording's own; all is scored there but
             ``end_margin`` frames. Each end is drawn by itself.
@@ -93,7 +94,6 @@ class TwoWaySettings:
     """
 
     planted: float = 2.5
-    cool_down: int = 400
     margin: int = 20
     end_share: float = 0.25
     end_margin: int = 2
@@ -115,7 +115,7 @@ class TrainingConfig:
         hidden_size: of the encoder.
         learning_rate, learning_rate_decay: Adam, and the factor per step.
         schedule: ``decay`` by that factor, or ``cosine``: a rise, then half a cosine over the
-            steps; not for ``two-way``, which has its own.
+            steps.
         seed: of the first weights, the windows and their errors.
         precision: ``bf16`` is three times faster on processors that have it.
         device: ``auto`` takes an accelerator where there is one.
@@ -123,10 +123,12 @@ class TrainingConfig:
         feature_form: ``v1``; the others are for the tables.
         contact_label: ``floor`` (height over a local floor, and speed), or ``paper`` (1 cm).
         mirror: half of the windows with left and right exchanged.
+        teachers: folders of finished runs of the recipe ``carried`` that this one listens to.
+        taught: share of the loss that is against what they say; the rest is against the truth.
         everybody: trained on the people of the validation part too, so nothing is validated; for
             weights that ship, with settings and steps that were chosen without it.
         average: of the weights over the steps: what the mean of before keeps in a step; 0 is none.
-            In the recipe ``carried`` the mean is what is validated and exported.
+            Not in the recipe ``paper``. The mean is what is validated and exported.
         mirror_mean: the exported network answers for its mirror image too and says the mean.
         validation_windows: drawn once from the validation clips.
         validate_every, checkpoint_every: steps.
@@ -148,6 +150,8 @@ class TrainingConfig:
     feature_form: Form = "v1"
     contact_label: Literal["floor", "paper"] = "floor"
     mirror: bool = True
+    teachers: tuple[str, ...] = ()
+    taught: float = 0.5
     everybody: bool = False
     average: float = 0.0
     mirror_mean: bool = False
@@ -180,42 +184,40 @@ class TrainingConfig:
                 "mirror_mean is for live networks that learnt from mirror images: set it to false, "
                 "or mirror to true and another recipe."
             )
-        if self.average > 0.0 and self.recipe != "carried":
-            raise ModelError(f"average is of the recipe carried: set it to 0 for {self.recipe}.")
+        if self.average > 0.0 and self.recipe == "paper":
+            raise ModelError("average is not of the recipe paper: set it to 0, or take another.")
+        if self.teachers and self.recipe != "carried":
+            raise ModelError(f"teachers are for the recipe carried: {self.recipe} has none.")
 
 
-_EPISODES = TrainingConfig(
+_CARRIED = TrainingConfig(
+    recipe="carried",
+    steps=2400,
     batch=64,
     window=60,
     hidden_size=384,
-    # less than half the time per step; the state stays float32
-    precision="bf16",
-    # the position of three joints guides the legs; the contact gets a gradient that it can feel
-    weights=LossWeights(pose=1.0, toe=1.0, velocity=4.5, contact=0.1),
-)
-
-_CARRIED = replace(
-    _EPISODES,
-    recipe="carried",
-    steps=2400,
     learning_rate=3e-3,
     schedule="cosine",
+    # less than half the time per step; the state stays float32
+    precision="bf16",
     average=0.998,
     mirror_mean=True,
+    # the position of three joints guides the legs; the contact gets a gradient that it can feel
+    weights=LossWeights(pose=1.0, toe=1.0, velocity=4.5, contact=0.1),
     validate_every=800,
     checkpoint_every=100,
 )
 
 _TWO_WAY = replace(
-    _EPISODES,
+    _CARRIED,
     recipe="two-way",
     steps=2300,
     window=120,
-    # 0.06 of the first rate after 2300 steps, before what the cool-down takes away
-    learning_rate_decay=0.99876,
+    mirror_mean=False,
     # every chunk is an episode of its own
     carried=CarriedSettings(mean_chunks=1.0),
-    validate_every=250,
+    validate_every=575,
+    checkpoint_every=50,
 )
 
 _RECIPES = {"paper": TrainingConfig(), "carried": _CARRIED, "two-way": _TWO_WAY}
@@ -243,6 +245,7 @@ def read_config(path: Path, **changes: Any) -> TrainingConfig:
         document["weights"] = LossWeights(**document.get("weights", {}))
         document["carried"] = CarriedSettings(**document.get("carried", {}))
         document["two_way"] = TwoWaySettings(**document.get("two_way", {}))
+        document["teachers"] = tuple(document.get("teachers", ()))
         return TrainingConfig(**document)
     except (OSError, ValueError, TypeError) as error:
         raise ModelError(

@@ -24,6 +24,7 @@ from lobstr_hw.training.augmentation import add_tracker_errors
 from lobstr_hw.training.balance import frame_weights
 from lobstr_hw.training.config import CarriedSettings, TrainingConfig
 from lobstr_hw.training.dataset import RATE_HZ, Clips, Float32
+from lobstr_hw.training.sitting import sat_down
 
 __all__ = ["Episode", "EpisodeSource"]
 
@@ -81,6 +82,9 @@ class EpisodeSource:
         """The next episode."""
         clip, times = self._piece(rng)
         p, R, pose, contact = self._at(clip, times)
+        share = self._config.carried.sitting_share
+        if share > 0.0 and rng.random() < share:
+            p, R, pose = sat_down(p, R, pose, RATE_HZ, rng)
         yaw = heading_angle(reference_frames(R[:, 0]))[0]
         x = self._features(p, R, rng)
         episode = Episode(

@@ -4,6 +4,8 @@ One set of weights, two states. At batch 1 a step's time goes into reading the w
 second answer costs little; what it takes away is what one side of the body has learnt by chance.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import torch
 from onnx import NodeProto
@@ -15,7 +17,10 @@ from lobstr_hw.training.config import TrainingConfig
 from lobstr_hw.training.network import LobstrNetwork
 from lobstr_hw.training.onnx_graph import node
 
-__all__ = ["MirrorMean", "mirror_matrices", "mirror_nodes", "shipped"]
+__all__ = ["MirrorMean", "Step", "both_sides", "mirror_matrices", "mirror_nodes", "shipped"]
+
+Step = Callable[[Tensor, Tensor | None], tuple[Tensor, Tensor, Tensor]]
+"""Input and state -> pose, contact logits and state."""
 
 
 def mirror_matrices(inputs: int) -> dict[str, Tensor]:
@@ -47,13 +52,23 @@ class MirrorMean(nn.Module):
         self, x: Tensor, hidden: Tensor | None = None, last_only: bool = True
     ) -> tuple[Tensor, Tensor, Tensor]:
         """As :meth:`LobstrNetwork.forward`, with a state (1, n, 2 H)."""
-        M = mirror_matrices(x.shape[-1])
-        n = len(x)
-        both = None if hidden is None else torch.cat(hidden.chunk(2, dim=-1), dim=1)
-        pose, logits, both = self.network(torch.cat([x, x @ M["mirror_x"]]), both, last_only)
-        pose = 0.5 * (pose[:n] + pose[n:] @ M["mirror_pose"])
-        logits = 0.5 * (logits[:n] + logits[n:] @ M["mirror_contact"])
-        return pose, logits, torch.cat(both.chunk(2, dim=1), dim=-1)
+
+        def step(both: Tensor, state: Tensor | None) -> tuple[Tensor, Tensor, Tensor]:
+            pose, logits, state = self.network(both, state, last_only)
+            return pose, logits, state
+
+        return both_sides(step, x, hidden)
+
+
+def both_sides(step: Step, x: Tensor, hidden: Tensor | None) -> tuple[Tensor, Tensor, Tensor]:
+    """The mean of a network's answers for x (n, ...) and its mirror image, and both states."""
+    M = mirror_matrices(x.shape[-1])
+    n = len(x)
+    both = None if hidden is None else torch.cat(hidden.chunk(2, dim=-1), dim=1)
+    pose, logits, both = step(torch.cat([x, x @ M["mirror_x"]]), both)
+    pose = 0.5 * (pose[:n] + pose[n:] @ M["mirror_pose"])
+    logits = 0.5 * (logits[:n] + logits[n:] @ M["mirror_contact"])
+    return pose, logits, torch.cat(both.chunk(2, dim=1), dim=-1)
 
 
 def shipped(network: LobstrNetwork, config: TrainingConfig) -> LobstrNetwork | MirrorMean:

@@ -111,6 +111,7 @@ def gathered(carried: Carried | None, who: Processes) -> Carried | None:
     dist.all_gather_object(parts, carried)
     return Carried(
         torch.cat([part.hidden for part in parts], dim=1),
+        torch.cat([part.taught for part in parts], dim=1),
         Position(
             np.concatenate([part.position.episode for part in parts]),
             np.concatenate([part.position.chunk for part in parts]),
@@ -125,4 +126,4 @@ def part_of(carried: Carried | None, who: Processes) -> Carried | None:
     n = len(carried.position.chunk) // who.count
     mine = slice(who.rank * n, (who.rank + 1) * n)
     position = Position(carried.position.episode[mine], carried.position.chunk[mine])
-    return Carried(carried.hidden[:, mine], position)
+    return Carried(carried.hidden[:, mine], carried.taught[:, mine], position)

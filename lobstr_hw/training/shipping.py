@@ -13,7 +13,7 @@ from lobstr_hw.predictors.predictor import ModelCard
 from lobstr_hw.predictors.weights import NetworkCard, write_card
 from lobstr_hw.skeleton import SKELETON_VERSION
 from lobstr_hw.trackers import FOUR_POINTS
-from lobstr_hw.training.checkpoint import Run, load_checkpoint
+from lobstr_hw.training.checkpoint import Run, finished_weights, load_checkpoint
 from lobstr_hw.training.config import Recipe, TrainingConfig, read_config
 from lobstr_hw.training.dataset import RATE_HZ
 from lobstr_hw.training.export import ExportError, export_network
@@ -80,9 +80,7 @@ def export_run(folder: Path, out: Path, metrics: Mapping[str, Path] | None = Non
     # exported on the CPU, wherever it was trained
     run = load_checkpoint(folder / "checkpoint.pt", replace(config, device="cpu"))
     data = _read_json(folder / "data.json")
-    weights = run.average if run.best is None else run.best
-    if weights is not None:
-        run.network.load_state_dict(weights)
+    run.network.load_state_dict(finished_weights(run))
     details = {
         "recipe": config.recipe,
         "architecture": _architecture(config),
@@ -93,7 +91,7 @@ def export_run(folder: Path, out: Path, metrics: Mapping[str, Path] | None = Non
         "wall_s": round(run.wall_s),
         "data": data,
         "licences": notices(data.get("minutes_by_set", {})),
-        "configuration": asdict(config),
+        "configuration": asdict(config) | {"teachers": _teachers(config)},
         "metrics": {k: _read_json(p).get("all", {}) for k, p in (metrics or {}).items()},
     }
     error = _write(shipped(run.network, config), network_card(run, config, details), out)
@@ -106,6 +104,12 @@ def _write(network: LobstrNetwork | MirrorMean, card: NetworkCard, out: Path) ->
     if isinstance(network, TwoWayNetwork):
         return export_two_way(network, card, out)
     return export_network(network, card, out)
+
+
+def _teachers(config: TrainingConfig) -> list[dict[str, Any]]:
+    """Their own settings; where they lay is of no use to anybody else."""
+    settings = [asdict(read_config(Path(folder) / "config.json")) for folder in config.teachers]
+    return [one | {"teachers": len(one["teachers"])} for one in settings]
 
 
 def _architecture(config: TrainingConfig) -> str:

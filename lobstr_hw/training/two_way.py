@@ -14,6 +14,7 @@ from torch import Tensor, nn
 
 from lobstr_hw.lower_body import POSE_SIZE
 from lobstr_hw.predictors.two_way import in_chunks
+from lobstr_hw.training.averaging import add_to_average, with_average
 from lobstr_hw.training.carried import held_out_clips, keep_best, validate_carried
 from lobstr_hw.training.carried_losses import (
     ChunkTargets,
@@ -30,8 +31,9 @@ from lobstr_hw.training.kinematics import toes_in_reference
 from lobstr_hw.training.mirrored import MirrorMean
 from lobstr_hw.training.network import LobstrNetwork
 from lobstr_hw.training.recurrence import run_gru_both_ways
+from lobstr_hw.training.schedule import set_learning_rate
 
-__all__ = ["InChunks", "counted_frames", "learning_rate", "planted_term", "train_two_way"]
+__all__ = ["InChunks", "counted_frames", "planted_term", "train_two_way"]
 
 _MARGINS = 2**32 - 1
 """In a chunk's place in the seed: the generator that says which ends are scored."""
@@ -46,17 +48,18 @@ def train_two_way(
     while run.step < config.steps:
         run.curve.append(_train_step(run, source, config))
         run.step += 1
+        add_to_average(run, config)
         due = run.step % config.validate_every == 0 or run.step == config.steps
         if held_out and due:
-            keep_best(run, [float(run.step), *validate_carried(InChunks(run.network), held_out)])
+            with with_average(run):
+                figures = validate_carried(InChunks(run.network), held_out)
+                keep_best(run, [float(run.step), *figures])
         yield run
 
 
 def _train_step(run: Run, source: EpisodeSource, config: TrainingConfig) -> list[float]:
     """One batch of chunks; returns a row of the curve."""
-    rate = learning_rate(run.step, config)
-    for group in run.optimizer.param_groups:
-        group["lr"] = rate
+    rate = set_learning_rate(run.optimizer, config, run.step)
     run.network.train()
     x, truth = _batch(source, config, run.step)
     z = torch.from_numpy((x - run.stats.input_mean) / run.stats.input_scale)
@@ -108,13 +111,6 @@ def counted_frames(
     frame = np.arange(frames)
     inside = (frame >= margin[0]) & (frames - 1 - frame >= margin[1])
     return np.asarray(inside, dtype=np.float32)
-
-
-def learning_rate(step: int, config: TrainingConfig) -> float:
-    """By the usual decay, and over the last steps down to a tenth of it: the weights settle."""
-    cool_down = min(config.two_way.cool_down, config.steps)
-    cooled = max(step - (config.steps - cool_down), 0) / max(cool_down, 1)
-    return float(config.learning_rate * config.learning_rate_decay**step * 0.1**cooled)
 
 
 def _through(network: LobstrNetwork, z: Tensor, config: TrainingConfig) -> tuple[Tensor, Tensor]:

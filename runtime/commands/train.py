@@ -82,6 +82,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--seed", type=int, help="of weights, windows and errors (1)")
     parser.add_argument(
+        "--teacher",
+        dest="teachers",
+        action="append",
+        metavar="DIR",
+        help="a finished run of --recipe carried to listen to (repeatable)",
+    )
+    parser.add_argument(
         "--precision", choices=("fp32", "bf16"), help="of the products (paper fp32, others bf16)"
     )
     parser.add_argument(
@@ -156,7 +163,9 @@ def _config(options: argparse.Namespace) -> "TrainingConfig":
 
     keys = ("steps", "seed", "precision", "device", "network", "feature_form", "everybody")
     named = {key: getattr(options, key) for key in keys}
-    changes = {key: value for key, value in named.items() if value is not None}
+    changes: dict[str, Any] = {key: value for key, value in named.items() if value is not None}
+    if options.teachers:
+        changes["teachers"] = tuple(options.teachers)
     kept = options.out / "config.json"
     source = options.config or (kept if options.resume else None)
     if source:

@@ -96,6 +96,11 @@ def test_only_windows_train_the_tables_networks() -> None:
         recipe_config("carried", network="lstm")
 
 
+def test_the_papers_recipe_has_no_mean_of_the_weights() -> None:
+    with pytest.raises(ModelError, match="average"):
+        recipe_config("paper", average=0.9)
+
+
 @pytest.mark.parametrize("form", get_args(Form))
 def test_every_form_of_the_input_trains_and_is_exported(
     clips: Clips, tmp_path: Path, form: Form

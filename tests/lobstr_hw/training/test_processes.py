@@ -105,9 +105,14 @@ def test_the_streams_of_all_processes_are_kept_together_and_shared_out_again() -
     from lobstr_hw.training.processes import Processes, gathered, part_of
     from lobstr_hw.training.streams import Position
 
-    whole = Carried(torch.arange(6.0)[None, :, None], Position(np.arange(6), 10 + np.arange(6)))
+    hidden, position = torch.arange(6.0)[None, :, None], Position(np.arange(6), 10 + np.arange(6))
+    whole = Carried(hidden, 100.0 * hidden, position)
     parts = [part_of(whole, Processes(2, rank)) for rank in (0, 1)]
     assert [part.hidden.flatten().tolist() for part in parts if part] == [[0, 1, 2], [3, 4, 5]]
+    assert [part.taught.flatten().tolist() for part in parts if part] == [
+        [0, 100, 200],
+        [300, 400, 500],
+    ]
     assert [part.position.chunk.tolist() for part in parts if part] == [[10, 11, 12], [13, 14, 15]]
     assert gathered(whole, Processes()) is whole
 

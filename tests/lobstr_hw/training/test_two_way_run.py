@@ -19,7 +19,6 @@ from lobstr_hw.rotations import rotation_x
 from lobstr_hw.training.config import (
     CarriedSettings,
     TrainingConfig,
-    TwoWaySettings,
     recipe_config,
     write_config,
 )
@@ -37,7 +36,6 @@ SMALL = recipe_config(
     batch=4,
     window=60,
     hidden_size=16,
-    two_way=TwoWaySettings(cool_down=4),
     validate_every=5,
     checkpoint_every=4,
 )
@@ -121,20 +119,6 @@ def test_inner_ends_are_not_scored_and_some_ends_are(clips: Clips) -> None:
     assert both.mean() == pytest.approx(settings.end_share**2, abs=0.02), "each end by itself"
 
 
-def test_the_rate_falls_smoothly_and_to_a_tenth_in_the_cool_down() -> None:
-    from lobstr_hw.training.two_way import learning_rate
-
-    config = recipe_config("two-way")
-    rates = np.array([learning_rate(step, config) for step in range(config.steps)])
-    assert rates[0] == config.learning_rate
-    ratio = rates[1:] / rates[:-1]
-    warm = config.steps - config.two_way.cool_down
-    np.testing.assert_allclose(ratio[: warm - 1], config.learning_rate_decay)
-    assert ratio[warm:].max() < ratio[: warm - 1].min()
-    plain = config.learning_rate * config.learning_rate_decay ** (config.steps - 1)
-    assert rates[-1] == pytest.approx(0.1 * plain, rel=0.02)
-
-
 @pytest.mark.parametrize("precision", ["bf16", "fp32"])
 def test_what_is_trained_is_what_the_network_says(clips: Clips, precision: str) -> None:
     """The fast recurrence of bfloat16 products differs by their rounding only."""
@@ -197,7 +181,6 @@ def test_only_feet_that_stand_pay_for_being_planted() -> None:
     [
         {"carried": CarriedSettings(mean_chunks=3.0)},
         {"mirror_mean": True},
-        {"average": 0.9},
     ],
 )
 def test_settings_that_do_not_go_with_it_are_refused_before_the_training(

@@ -1,0 +1,31 @@
+"""A network over a chunk of frames, in the precision of the settings."""
+
+from torch import Tensor, nn
+
+from lobstr_hw.training.config import TrainingConfig
+from lobstr_hw.training.devices import device_of, precision_of
+from lobstr_hw.training.network import LobstrNetwork
+from lobstr_hw.training.recurrence import run_gru
+
+__all__ = ["over_chunk"]
+
+
+def over_chunk(
+    network: LobstrNetwork, x: Tensor, hidden: Tensor | None, config: TrainingConfig
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Pose (n, frames, 48), logits (n, frames, 4) and the last state (1, n, H) of a chunk.
+
+    Args:
+        network: on the device of the settings.
+        x: (n, frames, inputs), z-scored.
+        hidden: (1, n, H), zero when None.
+        config: says the precision.
+    """
+    gru = network.encoder
+    hidden = x.new_zeros(1, len(x), network.state_size) if hidden is None else hidden
+    if config.precision == "bf16" and isinstance(gru, nn.GRU) and device_of(config).type == "cpu":
+        encoded, hidden = run_gru(gru, x, hidden)
+        return *network.heads(encoded), hidden
+    with precision_of(config):
+        pose, logits, hidden = network(x, hidden, last_only=False)
+    return pose, logits, hidden
