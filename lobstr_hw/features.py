@@ -112,14 +112,24 @@ def reference_frame(
     return np.where(((certainty < HEADING_MINIMUM) & keep)[..., None, None], last, R_ref)
 
 
-def reference_frames(R_hips: Array, form: Form = "v1") -> Array:
-    """:func:`reference_frame` step by step along the first axis (frames, ..., 3, 3)."""
+def reference_frames(R_hips: Array, form: Form = "v1", first: Array | None = None) -> Array:
+    """:func:`reference_frame` step by step along the first axis (frames, ..., 3, 3).
+
+    Args:
+        R_hips: (frames, ..., 3, 3) in the world.
+        form: as there.
+        first: (..., 3, 3) for the first frame and on until the pelvis has a heading, if it has none
+            there; None takes what there is.
+    """
     yaw, certainty = _yaw(R_hips, form)
     good = certainty >= HEADING_MINIMUM
-    good[0] = True
     frame = np.arange(len(yaw)).reshape(-1, *(1,) * (yaw.ndim - 1))
     last_good = np.maximum.accumulate(np.where(good, frame, 0), axis=0)
-    return rotation_y(np.take_along_axis(yaw, last_good, axis=0))
+    R_ref = rotation_y(np.take_along_axis(yaw, last_good, axis=0))
+    if first is None:
+        return R_ref
+    unknown = ~np.logical_or.accumulate(good, axis=0)
+    return np.where(unknown[..., None, None], first, R_ref)
 
 
 def _yaw(R_hips: Array, form: Form) -> tuple[Array, Array]:

@@ -8,12 +8,13 @@ import numpy.typing as npt
 
 from lobstr_hw.features import POINT_ROLES, Form, Points, features, reference_frame
 from lobstr_hw.lower_body import pose_from_6d
-from lobstr_hw.predictors.predictor import Bools, Frame, ModelCard, Prediction, State
+from lobstr_hw.predictors import bridge
+from lobstr_hw.predictors.predictor import Frame, ModelCard, Prediction, State
 from lobstr_hw.predictors.weights import Network
 from lobstr_hw.rotations import Array, heading
 from lobstr_hw.skeleton import Body, Joint
 
-__all__ = ["GIVES", "Lobstr", "frame_points", "prediction_from_6d", "softmax_contact"]
+__all__ = ["GIVES", "Lobstr", "prediction_from_6d", "seen_points", "softmax_contact"]
 
 GIVES = (
     Joint.LEFT_UPPER_LEG,
@@ -34,7 +35,9 @@ class Lobstr:
     """The paper's network as a pure step (see ``predictor.Predictor``).
 
     State: hidden (n, H) float32; the points of the step before (p, R, valid_p, valid_R, R_ref);
-    started (n,) whether there was one; time_s (n,) of it; scale (n,) of the user.
+    started (n,) whether there was one; time_s (n,) of it; scale (n,) of the user; and what is kept
+    for points that are lost (:mod:`lobstr_hw.predictors.bridge`), which are guessed here: what a
+    frame holds in their place counts only until they are seen for the first time.
     """
 
     network: Network
@@ -57,19 +60,24 @@ class Lobstr:
             "started": np.zeros(n, dtype=bool),
             "time_s": np.zeros(n),
             "scale": np.array(body.scale, dtype=np.float64),
+            **bridge.begun(n, self.network.card.hidden_size),
         }
 
     def step(self, state: State, frame: Frame) -> tuple[State, Prediction]:
         """One grid step (section 3.1 to 3.3 of the paper)."""
         card = self.network.card
-        now = frame_points(frame, state["R_ref"], state["started"], card.feature_form)
-        before = Points(state["p"], state["R"], state["valid_p"], state["valid_R"], state["R_ref"])
         elapsed = frame.time_s - state["time_s"]
         linked = state["started"] & (elapsed * card.model.rate_hz < GAP_STEPS)
+        seen = seen_points(frame)
+        state = bridge.bridged(state, seen, linked, self.network)
+        now = _points(state, seen, card.feature_form)
+        before = bridge.last_points(state)
         x = features(before, now, linked, card.feature_form, state["scale"])  # (n, 37)
         z = (x.astype(np.float32) - card.input_mean) / card.input_scale
         hidden, pose, logits = self.network.step(z, state["hidden"])
-        return _state_after(state, now, hidden, frame.time_s), prediction_from_6d(pose, logits)
+        new = _state_after(state, now, hidden, frame.time_s)
+        new |= bridge.remembered(state, now, linked)
+        return new, prediction_from_6d(pose, logits)
 
     def shift_world(self, state: State, T: Array) -> State:
         """The play space moved by T (n, 4, 4): the remembered points and heading move along."""
@@ -80,15 +88,22 @@ class Lobstr:
             "p": p,
             "R": R_T[:, None] @ state["R"],
             "R_ref": heading(R_T) @ state["R_ref"],
+            **bridge.shifted(state, T),
         }
 
 
-def frame_points(frame: Frame, R_ref_before: Array, started: Bools, form: Form) -> Points:
-    """The four points of a frame, in the order of the features."""
+def seen_points(frame: Frame) -> Points:
+    """The four points of a frame, in the order of the features; not yet in a reference frame."""
     order = [frame.index(role) for role in POINT_ROLES]
-    R = frame.R[:, order]
-    R_ref = reference_frame(R[:, 0], R_ref_before, started, form)
-    return Points(frame.p[:, order], R, frame.valid_p[:, order], frame.valid_R[:, order], R_ref)
+    valid_p, valid_R = frame.valid_p[:, order], frame.valid_R[:, order]
+    return Points(frame.p[:, order], frame.R[:, order], valid_p, valid_R, frame.R[:, order[0]])
+
+
+def _points(state: State, seen: Points, form: Form) -> Points:
+    """What is lost guessed, and the reference frame."""
+    now = bridge.guessed(state, seen)
+    R_ref = reference_frame(now.R[:, 0], state["R_ref"], state["started"], form)
+    return Points(now.p, now.R, now.valid_p, now.valid_R, R_ref)
 
 
 def _state_after(

@@ -8,9 +8,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from lobstr_hw.features import Points, features, reference_frames
+from lobstr_hw.features import Points, features
 from lobstr_hw.ik.vectors import smoothstep
-from lobstr_hw.predictors.lobstr import GAP_STEPS, Lobstr, frame_points, prediction_from_6d
+from lobstr_hw.predictors.lobstr import GAP_STEPS, Lobstr, prediction_from_6d, seen_points
+from lobstr_hw.predictors.mended import mended
 from lobstr_hw.predictors.predictor import Bools, Frame, Prediction
 from lobstr_hw.predictors.scripted import Scripted
 from lobstr_hw.predictors.two_way import TwoWay
@@ -22,7 +23,7 @@ TWO_WAY_SHARE = 0.7
 """Of the mean; the rest is the live one's, which errs more, but otherwise (docs/experiments.md)."""
 BLEND_S = 0.5
 LOST_S = 1.5
-"""Longer losses than in training are left to the live network."""
+"""Longer losses than in training are left to the live network; those that are mended are none."""
 SHORTEST_S = 2.0
 """Of what is known without a break: in less there is not much future."""
 _PELVIS, _HEAD = 0, 1
@@ -43,8 +44,8 @@ def refined(frames: Sequence[Frame], live: Lobstr, two_way: TwoWay) -> Scripted:
         raise ValueError("a recording without frames cannot be refined")
     rate_hz = live.card.rate_hz
     times_s = np.array([frame.time_s for frame in frames])
-    points = _points(frames)
     linked = np.diff(times_s, prepend=-np.inf) * rate_hz < GAP_STEPS
+    points = mended(_points(frames), linked)
     return Scripted(two_way.card, times_s, refined_prediction(points, linked, live, two_way))
 
 
@@ -68,15 +69,14 @@ def refined_prediction(points: Points, linked: Bools, live: Lobstr, two_way: Two
 
 
 def _points(frames: Sequence[Frame]) -> Points:
-    """The points of all frames (frames, 4, ...), with their reference frames."""
-    single = [
-        frame_points(frame, np.eye(3)[None], np.zeros(1, dtype=bool), "v1") for frame in frames
-    ]
-    p, R, valid_p, valid_R = (
-        np.concatenate([getattr(one, name) for one in single])
-        for name in ("p", "R", "valid_p", "valid_R")
+    """The points of all frames (frames, 4, ...)."""
+    single = [seen_points(frame) for frame in frames]
+    return Points(
+        *(
+            np.concatenate([getattr(one, name) for one in single])
+            for name in ("p", "R", "valid_p", "valid_R", "R_ref")
+        )
     )
-    return Points(p, R, valid_p, valid_R, reference_frames(R[:, _PELVIS]))
 
 
 def _live(live: Lobstr, points: Points, linked: Bools) -> tuple[Array, Array]:

@@ -1,0 +1,83 @@
+"""Where a point is that no tracker sees: it goes on with the part of the body next to it.
+
+A lost pelvis goes with the head, a lost head or hand with the pelvis. Only what happens from one
+step to the next is looked at, so there is nothing to remember but the last poses.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lobstr_hw.features import Bools, Points
+from lobstr_hw.rotations import Array, heading_angle, rotation_y, transpose
+
+__all__ = ["follow"]
+
+_PELVIS, _HEAD, _LEFT, _RIGHT = range(4)
+_UP = 1
+
+
+@dataclass(frozen=True, slots=True)
+class _Following:
+    """Who goes with whom, and with how much of its turn about the vertical and of its rise."""
+
+    leader: int
+    followers: tuple[int, ...]
+    turn: float
+    rise: float
+
+
+_ORDER = (
+    # people look around and bow without their hips: shares chosen on validation (docs/decisions.md)
+    _Following(_HEAD, (_PELVIS,), turn=0.5, rise=0.7),
+    _Following(_PELVIS, (_HEAD, _LEFT, _RIGHT), turn=1.0, rise=1.0),
+)
+HIGHEST_HIPS = 1.05
+"""Metres on the standard skeleton, which stands at 1.0: hips lost in a bow do not float when the
+head comes up again."""
+
+
+def follow(before: Points, now: Points, seen: Bools) -> Points:
+    """The points now, those that are lost taken along from a step before.
+
+    Their followers stay where they are while a leader is lost as well, and in the step in which it
+    is lost or comes back: that is no movement.
+
+    Args:
+        before: (n, 4, ...) pelvis, head and hands a step ago; metres on the standard skeleton.
+        now: (n, 4, ...); what is not valid is guessed.
+        seen: (n, 4) which were seen at some time; the others are left as they are.
+    """
+    lost_p, lost_R = ~now.valid_p & seen, ~now.valid_R & seen
+    if not (lost_p.any() or lost_R.any()):
+        return now
+    same = (before.valid_p == now.valid_p) & (before.valid_R == now.valid_R)
+    p = np.where(lost_p[..., None], before.p, now.p)
+    R = np.where(lost_R[..., None, None], before.R, now.R)
+    for one in _ORDER:
+        led = list(one.followers)
+        if not (lost_p[:, led].any() or lost_R[:, led].any()):
+            continue
+        led_p = lost_p[:, led] & same[:, one.leader, None]
+        led_R = lost_R[:, led] & same[:, one.leader, None]
+        guess_p, guess_R = _led(one, before.p, before.R, p, R)
+        p[:, led] = np.where(led_p[..., None], guess_p, p[:, led])
+        R[:, led] = np.where(led_R[..., None, None], guess_R, R[:, led])
+    return Points(p, R, now.valid_p, now.valid_R, now.R_ref)
+
+
+def _led(
+    one: _Following, p_before: Array, R_before: Array, p: Array, R: Array
+) -> tuple[Array, Array]:
+    """Poses (n, followers, ...) of all followers, lost or not."""
+    led, leader = list(one.followers), one.leader
+    yaw, _ = heading_angle(R[:, leader] @ transpose(R_before[:, leader]))
+    turn = rotation_y(one.turn * yaw)[:, None]
+    arm = p_before[:, led] - p_before[:, None, leader]
+    guess = p[:, None, leader] + (turn @ arm[..., None])[..., 0]
+    rise = one.rise * (p[:, None, leader, _UP] - p_before[:, None, leader, _UP])
+    height = p_before[:, led, _UP]
+    if _PELVIS in led:
+        rise = np.minimum(rise, np.maximum(HIGHEST_HIPS - height, 0.0))
+    guess[..., _UP] = height + rise
+    return guess, turn @ R_before[:, led]
