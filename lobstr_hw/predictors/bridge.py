@@ -25,6 +25,7 @@ from lobstr_hw.rotations import Array, slerp, transpose
 
 __all__ = [
     "NEVER",
+    "all_seen",
     "begun",
     "bent",
     "bridged",
@@ -48,12 +49,12 @@ def begun(n: int, hidden_size: int) -> State:
 
     Returns:
         lost (n, 4): steps since each point was last seen; kept (n, 4, H): the hidden state then;
-        slot (n,): of the last step in the memory; and the memory.
+        steps (n,) done; and the memory, in which a step has the slot of its number.
     """
     return {
         "lost": np.full((n, 4), NEVER),
         "kept": np.zeros((n, 4, hidden_size), dtype=np.float32),
-        "slot": np.zeros(n, dtype=np.int64),
+        "steps": np.zeros(n, dtype=np.int64),
         **gap_memory.empty(n),
     }
 
@@ -63,10 +64,15 @@ def shifted(state: State, T: Array) -> State:
     return gap_memory.shifted(state, T)
 
 
+def all_seen(state: State, now: Points) -> bool:
+    """Whether everybody's points are there, in this step and the one before: nothing to do."""
+    # a tenth of what any() and all() take, and this is in every step
+    there = np.count_nonzero(now.valid_p & now.valid_R) == now.valid_p.size
+    return bool(there and np.count_nonzero(state["lost"]) == 0)
+
+
 def guessed(state: State, now: Points) -> Points:
     """The points (n, 4, ...) of which those that are lost, and were seen once, are guessed."""
-    if now.valid_p.all() and now.valid_R.all():
-        return now
     return follow(last_points(state), now, state["lost"] < NEVER)
 
 
@@ -79,10 +85,8 @@ def bridged(state: State, now: Points, linked: Bools, network: Network) -> State
         linked: (n,) whether the step before was one grid step ago.
         network: that the state is of.
     """
-    lost = state["lost"]
-    if not lost.any():
-        return state
-    fresh, seen = (lost > 0) & (lost < GIVEN_UP) & linked[:, None], _seen(now)
+    lost, seen = state["lost"], _seen(now)
+    fresh = (lost > 0) & (lost < GIVEN_UP) & linked[:, None]
     who = np.flatnonzero((fresh & seen).any(axis=-1))
     if not len(who):
         return state
@@ -90,7 +94,7 @@ def bridged(state: State, now: Points, linked: Bools, network: Network) -> State
     still = np.where(fresh & ~seen, lost, 0)[who]
     steps = gaps.max(axis=-1)
     ages = np.arange(steps.max(), -1, -1)[:, None]  # steps before the last one
-    slots = (state["slot"][who] - np.minimum(ages, steps)) % FRAMES  # (frames, m)
+    slots = (state["steps"][who] - np.minimum(ages, steps)) % FRAMES  # (frames, m)
     form = network.card.feature_form
     points = _filled(gap_memory.read(state, who, slots), now.take(who), gaps, lost[who], form)
     x = clip_features(points, form, state["scale"][who])
@@ -185,35 +189,33 @@ def _with_rows(state: State, who: Ints, points: Points, hidden: Float32, kept: F
 
 
 def remembered(state: State, now: Points, linked: Bools) -> State:
-    """What :func:`begun` lists, after a step.
+    """What :func:`begun` lists but the steps, after a step.
 
     Args:
         state: before it (:func:`bridged`).
         now: (n, 4, ...) points of the step.
         linked: (n,) whether the step before was one grid step ago.
     """
-    memory = {name: state[name] for name in ("lost", "kept", *gap_memory.NAMES)}
-    memory["slot"] = (state["slot"] + 1) % FRAMES
     before = state["lost"]
-    if now.valid_p.all() and now.valid_R.all() and not before.any():
-        return memory
     lost = np.where(linked[:, None], before + 1, GIVEN_UP)
     lost = np.where(before == NEVER, NEVER, np.minimum(lost, GIVEN_UP))
-    memory["lost"] = lost = np.where(_seen(now), 0, lost)
+    lost = np.where(_seen(now), 0, lost)
+    kept = state["kept"]
     k, role = np.nonzero(lost == 1)
     if len(k):
-        memory["kept"] = state["kept"].copy()
-        memory["kept"][k, role] = state["hidden"][k]
-    return {**memory, **_recorded(state, now, memory["slot"], before, lost)}
+        kept = kept.copy()
+        kept[k, role] = state["hidden"][k]
+    return {"lost": lost, "kept": kept, **_recorded(state, now, before, lost)}
 
 
-def _recorded(state: State, now: Points, slot: Ints, before: Ints, lost: Ints) -> State:
+def _recorded(state: State, now: Points, before: Ints, lost: Ints) -> State:
     """The memory, written for those with a gap that may be bridged yet."""
     on, was_on = (((steps > 0) & (steps < GIVEN_UP)).any(axis=-1) for steps in (lost, before))
     who = np.flatnonzero(on & ~was_on)  # the last step before the gap is one end of it
-    memory = gap_memory.written(state, who, state["slot"][who], last_points(state).take(who))
+    slots = state["steps"] % FRAMES
+    memory = gap_memory.written(state, who, slots[who], last_points(state).take(who))
     who = np.flatnonzero(on)
-    return gap_memory.written(memory, who, slot[who], now.take(who))
+    return gap_memory.written(memory, who, (slots[who] + 1) % FRAMES, now.take(who))
 
 
 def last_points(state: State) -> Points:

@@ -68,15 +68,19 @@ class Lobstr:
         card = self.network.card
         elapsed = frame.time_s - state["time_s"]
         linked = state["started"] & (elapsed * card.model.rate_hz < GAP_STEPS)
-        seen = seen_points(frame)
-        state = bridge.bridged(state, seen, linked, self.network)
-        now = _points(state, seen, card.feature_form)
+        now = seen_points(frame)
+        calm = bridge.all_seen(state, now)
+        if not calm:
+            state = bridge.bridged(state, now, linked, self.network)
+            now = bridge.guessed(state, now)
+        now = _with_reference(now, state, card.feature_form)
         before = bridge.last_points(state)
         x = features(before, now, linked, card.feature_form, state["scale"])  # (n, 37)
         z = (x.astype(np.float32) - card.input_mean) / card.input_scale
         hidden, pose, logits = self.network.step(z, state["hidden"])
         new = _state_after(state, now, hidden, frame.time_s)
-        new |= bridge.remembered(state, now, linked)
+        if not calm:
+            new |= bridge.remembered(state, now, linked)
         return new, prediction_from_6d(pose, logits)
 
     def shift_world(self, state: State, T: Array) -> State:
@@ -99,9 +103,7 @@ def seen_points(frame: Frame) -> Points:
     return Points(frame.p[:, order], frame.R[:, order], valid_p, valid_R, frame.R[:, order[0]])
 
 
-def _points(state: State, seen: Points, form: Form) -> Points:
-    """What is lost guessed, and the reference frame."""
-    now = bridge.guessed(state, seen)
+def _with_reference(now: Points, state: State, form: Form) -> Points:
     R_ref = reference_frame(now.R[:, 0], state["R_ref"], state["started"], form)
     return Points(now.p, now.R, now.valid_p, now.valid_R, R_ref)
 
@@ -111,6 +113,7 @@ def _state_after(
 ) -> State:
     n = len(hidden)
     return {
+        **state,
         "hidden": hidden,
         "p": now.p,
         "R": now.R,
@@ -119,7 +122,7 @@ def _state_after(
         "R_ref": now.R_ref,
         "started": np.ones(n, dtype=bool),
         "time_s": np.full(n, time_s),
-        "scale": state["scale"],
+        "steps": state["steps"] + 1,
     }
 
 
