@@ -25,7 +25,7 @@ TOLD_EVERY = 12
 RESIDUAL_RAD = 1e-3
 """A few tenths are usual."""
 UP_RAD, UP_AT_LAST_RAD = 0.005, 0.02
-"""How well up should be known; and what has to do when a minute did not tell it better."""
+"""How well up should be known; and what has to do when 35 s of moving did not tell it better."""
 AT_LAST = 160
 ALONE = 120
 """Half a minute of moving without a sight of any station whose place is known: there is none."""
@@ -35,8 +35,8 @@ FIRST_WORDS = (
     "of all base stations, and leave it there until you are told more."
 )
 CARRY = (
-    "Now carry a tracker slowly through the room for half a minute, turning it every way; all base "
-    "stations should see it at once now and then."
+    "Now carry a tracker slowly through the room, turning it every way, for at least twelve "
+    "seconds and until the base stations are found; all of them should see it at once now and then."
 )
 
 
