@@ -13,6 +13,7 @@ from lobstr_hw.contact import ContactLock, LockSettings
 from lobstr_hw.errors import ModelError
 from lobstr_hw.ik.jacobian import LegPose
 from lobstr_hw.ik.vectors import rotate
+from lobstr_hw.last_points import LastPoints
 from lobstr_hw.legs import FEET, LOWER, TOES, UPPER, LegBody, TrackedFeet, pose_legs
 from lobstr_hw.prediction_state import LastTwo
 from lobstr_hw.predictors.predictor import Bools, Frame, Predictor, State
@@ -79,6 +80,7 @@ class Avatar:
             **_prefixed("predictor", self.predictor.start(self.body)),
             **_prefixed("shown", _flat(LastTwo.start(n, len(self._where)))),
             **_prefixed("lock", _flat(ContactLock.start(n))),
+            **_prefixed("last", _flat(LastPoints.start(n))),
             "avatar.R_ref": np.broadcast_to(np.eye(3), (n, 3, 3)).copy(),
             "avatar.time_s": np.zeros(n),
         }
@@ -90,7 +92,8 @@ class Avatar:
 
         Args:
             state: of the last tick.
-            frame: joint poses at the tick's time, in the standard size.
+            frame: joint poses at the tick's time, in the standard size; a pelvis, head or hand that
+                is lost is shown where the body next to it goes (:mod:`lobstr_hw.lost_points`).
             grid: those at the grid times due by this tick, oldest first; the predictor steps once
                 for each.
 
@@ -99,6 +102,8 @@ class Avatar:
         """
         inner, shown = self._predict(state, grid)
         lock = ContactLock(**_part(state, "lock"))
+        # what is held in mid-air while the legs walk on would be a statue that treads
+        last, frame = LastPoints(**_part(state, "last")).take_along(frame)
         p_hips, R_hips = frame.p[:, frame.index(TrackerRole.PELVIS)], _R(frame, TrackerRole.PELVIS)
         R_ref = heading(R_hips, state["avatar.R_ref"])
         R_given = self._given(shown, frame.time_s)
@@ -111,6 +116,7 @@ class Avatar:
             **_prefixed("predictor", inner),
             **_prefixed("shown", _flat(shown)),
             **_prefixed("lock", _flat(lock)),
+            **_prefixed("last", _flat(last)),
             "avatar.R_ref": R_ref,
             "avatar.time_s": np.full(len(p_hips), frame.time_s),
         }
@@ -120,10 +126,12 @@ class Avatar:
         """The state after the play space moved by T (n, 4, 4), a turn about Y and a shift."""
         inner = self.predictor.shift_world(_part(state, "predictor"), T)
         lock = ContactLock(**_part(state, "lock")).shifted(T)
+        last = LastPoints(**_part(state, "last")).shifted(T)
         return {
             **state,
             **_prefixed("predictor", inner),
             **_prefixed("lock", _flat(lock)),
+            **_prefixed("last", _flat(last)),
             "avatar.R_ref": heading(T[:, :3, :3]) @ state["avatar.R_ref"],
         }
 
@@ -244,7 +252,7 @@ def _reports(frame: Frame) -> dict[TrackerRole, RoleReport]:
     }
 
 
-def _flat(part: LastTwo | ContactLock) -> State:
+def _flat(part: LastTwo | ContactLock | LastPoints) -> State:
     return {field.name: getattr(part, field.name) for field in fields(part)}
 
 

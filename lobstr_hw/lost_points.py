@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lobstr_hw.features import Bools, Points
+from lobstr_hw.features import POINT_ROLES, Bools, Points
+from lobstr_hw.predictors.predictor import Frame
 from lobstr_hw.rotations import Array, heading_angle, rotation_y, transpose
 
-__all__ = ["follow"]
+__all__ = ["follow", "seen_points"]
 
 _PELVIS, _HEAD, _LEFT, _RIGHT = range(4)
 _UP = 1
@@ -37,11 +38,18 @@ HIGHEST_HIPS = 1.05
 head comes up again."""
 
 
+def seen_points(frame: Frame) -> Points:
+    """The four points of a frame, in the order of the features; not yet in a reference frame."""
+    order = [frame.index(role) for role in POINT_ROLES]
+    valid_p, valid_R = frame.valid_p[:, order], frame.valid_R[:, order]
+    return Points(frame.p[:, order], frame.R[:, order], valid_p, valid_R, frame.R[:, order[0]])
+
+
 def follow(before: Points, now: Points, seen: Bools) -> Points:
     """The points now, those that are lost taken along from a step before.
 
-    Their followers stay where they are while a leader is lost as well, and in the step in which it
-    is lost or comes back: that is no movement.
+    A pelvis stays where it is while the head is lost as well. When a leader comes back its
+    followers stay: to be seen again is no movement.
 
     Args:
         before: (n, 4, ...) pelvis, head and hands a step ago; metres on the standard skeleton.
@@ -51,15 +59,15 @@ def follow(before: Points, now: Points, seen: Bools) -> Points:
     lost_p, lost_R = ~now.valid_p & seen, ~now.valid_R & seen
     if not (lost_p.any() or lost_R.any()):
         return now
-    same = (before.valid_p == now.valid_p) & (before.valid_R == now.valid_R)
+    steady = (before.valid_p | ~now.valid_p) & (before.valid_R | ~now.valid_R)  # not back just now
     p = np.where(lost_p[..., None], before.p, now.p)
     R = np.where(lost_R[..., None, None], before.R, now.R)
     for one in _ORDER:
         led = list(one.followers)
         if not (lost_p[:, led].any() or lost_R[:, led].any()):
             continue
-        led_p = lost_p[:, led] & same[:, one.leader, None]
-        led_R = lost_R[:, led] & same[:, one.leader, None]
+        led_p = lost_p[:, led] & steady[:, one.leader, None]
+        led_R = lost_R[:, led] & steady[:, one.leader, None]
         guess_p, guess_R = _led(one, before.p, before.R, p, R)
         p[:, led] = np.where(led_p[..., None], guess_p, p[:, led])
         R[:, led] = np.where(led_R[..., None, None], guess_R, R[:, led])

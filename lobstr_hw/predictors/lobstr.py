@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lobstr_hw.features import POINT_ROLES, Form, Points, features, reference_frame
+from lobstr_hw.features import Form, Points, features, reference_frame
+from lobstr_hw.lost_points import seen_points
 from lobstr_hw.lower_body import pose_from_6d
 from lobstr_hw.predictors import bridge
 from lobstr_hw.predictors.predictor import Frame, ModelCard, Prediction, State
@@ -14,7 +15,7 @@ from lobstr_hw.predictors.weights import Network
 from lobstr_hw.rotations import Array, heading
 from lobstr_hw.skeleton import Body, Joint
 
-__all__ = ["GIVES", "Lobstr", "prediction_from_6d", "seen_points", "softmax_contact"]
+__all__ = ["GIVES", "Lobstr", "prediction_from_6d", "softmax_contact"]
 
 GIVES = (
     Joint.LEFT_UPPER_LEG,
@@ -94,13 +95,6 @@ class Lobstr:
             "R_ref": heading(R_T) @ state["R_ref"],
             **bridge.shifted(state, T),
         }
-
-
-def seen_points(frame: Frame) -> Points:
-    """The four points of a frame, in the order of the features; not yet in a reference frame."""
-    order = [frame.index(role) for role in POINT_ROLES]
-    valid_p, valid_R = frame.valid_p[:, order], frame.valid_R[:, order]
-    return Points(frame.p[:, order], frame.R[:, order], valid_p, valid_R, frame.R[:, order[0]])
 
 
 def _with_reference(now: Points, state: State, form: Form) -> Points:

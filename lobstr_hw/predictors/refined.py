@@ -10,7 +10,8 @@ import numpy as np
 
 from lobstr_hw.features import Points, features
 from lobstr_hw.ik.vectors import smoothstep
-from lobstr_hw.predictors.lobstr import GAP_STEPS, Lobstr, prediction_from_6d, seen_points
+from lobstr_hw.lost_points import seen_points
+from lobstr_hw.predictors.lobstr import GAP_STEPS, Lobstr, prediction_from_6d
 from lobstr_hw.predictors.mended import mended
 from lobstr_hw.predictors.predictor import Bools, Frame, Prediction
 from lobstr_hw.predictors.scripted import Scripted

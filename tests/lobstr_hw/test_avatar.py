@@ -187,6 +187,29 @@ def test_no_point_of_a_sole_goes_under_the_floor(hips_m: float) -> None:
         assert lowest > -1e-4
 
 
+@pytest.mark.parametrize("moved_at", [None, 30])
+def test_hips_and_hands_that_are_lost_go_where_the_body_goes(moved_at: int | None) -> None:
+    lost = np.isin(FOUR_POINTS, [TrackerRole.PELVIS, TrackerRole.LEFT_HAND])
+    avatar, T = Avatar(FakePredictor(), Body.standard()), np.eye(4)
+    joints = [ROLE_JOINT[role] for role in FOUR_POINTS]
+    state = avatar.start()
+    for k in range(60):
+        frame = frame_of(*walk(0.0), k / 45.0)  # a gliding body
+        p, R = frame.p + np.array([0.0, 0.0, 0.02 * k]), frame.R
+        if k == moved_at:
+            T[:3, :3], T[:3, 3] = rotation_y(1.2), [3.0, 0.0, -1.0]
+            state = avatar.shift_world(state, T[None])
+        p, R = p @ T[:3, :3].T + T[:3, 3], T[:3, :3] @ R
+        gone = lost & (20 <= k)
+        valid = ~gone[None]
+        given = np.where(gone[:, None], 9.0, p), np.where(gone[:, None, None], np.eye(3), R)
+        frame = Frame(frame.time_s, FOUR_POINTS, *given, valid, valid)
+        state, pose = avatar.step(state, frame, [frame])
+        np.testing.assert_allclose(pose.p_world[:, joints], p, atol=1e-5)
+        sources = pose.source[0, joints]
+        assert ((sources == Source.HELD) == gone).all()
+
+
 def test_feet_with_trackers_are_never_locked_and_stand_where_they_are_tracked() -> None:
     avatar = Avatar(FakePredictor(roles=SIX_POINTS), Body.standard())
     state = avatar.start()

@@ -7,9 +7,10 @@ import pytest
 from support.even_motion import even_motion, out_of_sight
 
 from lobstr_hw.features import Points, reference_frames
+from lobstr_hw.lost_points import seen_points
 from lobstr_hw.predictors import Frame, load_predictor
 from lobstr_hw.predictors.gap_memory import FRAMES
-from lobstr_hw.predictors.lobstr import Lobstr, seen_points
+from lobstr_hw.predictors.lobstr import Lobstr
 from lobstr_hw.predictors.mended import mended
 from lobstr_hw.predictors.refined import refined
 from lobstr_hw.predictors.two_way import load_two_way
