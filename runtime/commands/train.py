@@ -73,7 +73,7 @@ def _parser() -> argparse.ArgumentParser:
         "two-way: for recordings, the future is known too",
     )
     start.add_argument("--config", type=Path, metavar="FILE", help="a config.json to start from")
-    parser.add_argument("--steps", type=int, help="of one batch (1500; carried 2400; two-way 2300)")
+    parser.add_argument("--steps", type=int, help="of one batch (1500; carried 3000; two-way 2300)")
     parser.add_argument(
         "--everybody",
         action="store_true",
