@@ -144,6 +144,14 @@ def test_the_last_good_heading_is_kept_while_there_is_none() -> None:
     assert R_ref[3] == pytest.approx(rotation_y(-0.2))
 
 
+def test_a_part_of_a_recording_goes_on_with_the_heading_from_before_it() -> None:
+    yaw, upside_down = rotation_y(np.array([0.3, 1.1])), rotation_x(np.pi)
+    R_hips = np.stack([yaw, *[np.stack([upside_down] * 2)] * 3, rotation_y(np.array([-0.2, 0.6]))])
+    R_hips[2, 1] = rotation_y(0.9)
+    whole = reference_frames(R_hips)
+    np.testing.assert_allclose(reference_frames(R_hips[1:], first=whole[0]), whole[1:])
+
+
 def test_bowing_beyond_ninety_degrees_keeps_the_heading() -> None:
     yaw = rotation_y(0.5)
     assert reference_frame(yaw @ rotation_x(2.0)) == pytest.approx(yaw)

@@ -153,13 +153,36 @@ def test_a_gap_that_is_too_long_is_not_bridged(
     assert (apart > 1e-3) if steps < FRAMES else (apart == 0.0)
 
 
+@pytest.mark.parametrize("stall", [35, 50])
 def test_nothing_is_bridged_over_a_time_that_nobody_saw(
-    predictor: Predictor, monkeypatch: pytest.MonkeyPatch
+    predictor: Predictor, monkeypatch: pytest.MonkeyPatch, stall: int
 ) -> None:
     lost = out_of_sight(even_motion(60, PELVIS), PELVIS, LOST_AT, 50)
-    lost[35:] = [replace(frame, time_s=frame.time_s + 3.0) for frame in lost[35:]]
+    lost[stall:] = [replace(frame, time_s=frame.time_s + 3.0) for frame in lost[stall:]]
     never = unbridged(monkeypatch, lambda: run(predictor, lost)[0])
     assert off(never, run(predictor, lost)[0]) == 0.0
+
+
+def test_a_position_that_is_measured_all_along_stays_when_only_the_rotation_was_lost(
+    predictor: Predictor,
+) -> None:
+    taken = even_motion(61, PELVIS)
+    sway = [0.03 * np.sin(0.4 * i) * np.array([1.0, 0.0, 0.0]) for i in range(61)]
+    taken = [replace(f, p=f.p + by) for f, by in zip(taken, sway, strict=True)]
+    lost = out_of_sight(taken, PELVIS, LOST_AT, 60)
+    lost = [replace(f, p=true.p, valid_p=true.valid_p) for f, true in zip(lost, taken, strict=True)]
+    assert off(run(predictor, taken)[0], run(predictor, lost)[0]) < 1e-4
+
+
+def test_a_pelvis_that_is_long_lost_still_goes_with_the_head(predictor: Predictor) -> None:
+    still = even_motion(1, PELVIS)[0]
+    taken = [
+        replace(still, time_s=i / 45.0, p=still.p + i * np.array([0.01, 0.0, 0.02]))
+        for i in range(LOST_AT + 2 * FRAMES)
+    ]
+    state, _ = run(predictor, taken)
+    again, _ = run(predictor, out_of_sight(taken, PELVIS, LOST_AT, len(taken)))
+    assert again["p"] == pytest.approx(state["p"])
 
 
 def test_where_nothing_is_lost_nothing_is_copied(predictor: Predictor) -> None:
