@@ -29,6 +29,7 @@ __all__ = [
     "begun",
     "bent",
     "bridged",
+    "gap_part",
     "gone_on",
     "guessed",
     "last_points",
@@ -120,12 +121,11 @@ def _filled(points: Points, now: Points, gaps: Ints, lost: Ints, form: Form) -> 
         form: of the network.
     """
     guess = gone_on(points.take(-1), now, lost < NEVER)
-    ages = np.arange(len(points.p) - 1, -1, -1)[:, None, None]
-    part = np.clip((gaps - ages) / (gaps + 1), 0.0, 1.0)  # (frames, m, 4), of the way
-    p, R = bent(points.p, points.R, now.p - guess.p, now.R @ transpose(guess.R), part)
-    p = np.where(points.valid_p[..., None], points.p, p)
-    R = np.where(points.valid_R[..., None, None], points.R, R)
-    valid_p, valid_R = points.valid_p | (part > 0.0), points.valid_R | (part > 0.0)
+    off_p, off_R = now.p - guess.p, now.R @ transpose(guess.R)
+    part_p, part_R = (gap_part(v) * (gaps > 0) for v in (points.valid_p, points.valid_R))
+    p, R = bent(points.p, points.R, off_p, off_R, part_p, part_R)
+    ages = np.arange(len(p) - 1, -1, -1)[:, None, None]
+    valid_p, valid_R = (v | (ages < gaps) for v in (points.valid_p, points.valid_R))
     R_ref = reference_frames(R[:, :, 0], form, points.R_ref[0])
     return Points(p, R, valid_p, valid_R, R_ref)
 
@@ -135,7 +135,21 @@ def gone_on(last: Points, now: Points, seen: Bools) -> Points:
     return follow(last, replace(now, valid_p=last.valid_p, valid_R=last.valid_R), seen)
 
 
-def bent(p: Array, R: Array, off_p: Array, off_R: Array, part: Array) -> tuple[Array, Array]:
+def gap_part(valid: Bools) -> Array:
+    """How much of the way over a gap each frame has behind it; 0 before it.
+
+    Args:
+        valid: (frames, ...) which were measured. The gap is what is not at the end, and ends one
+            frame later.
+    """
+    steps = np.cumprod(~valid[::-1], axis=0).sum(axis=0)
+    ages = np.arange(len(valid) - 1, -1, -1).reshape(-1, *(1,) * (valid.ndim - 1))
+    return np.asarray(np.clip((steps - ages) / (steps + 1), 0.0, 1.0))
+
+
+def bent(
+    p: Array, R: Array, off_p: Array, off_R: Array, part_p: Array, part_R: Array
+) -> tuple[Array, Array]:
     """Guessed points, led evenly to where they are seen again.
 
     Args:
@@ -143,9 +157,10 @@ def bent(p: Array, R: Array, off_p: Array, off_R: Array, part: Array) -> tuple[A
         R: (frames, ..., 3, 3).
         off_p: (..., 3) by which the guess is off when the point is seen again.
         off_R: (..., 3, 3) the turn in the world from the guess to what is seen.
-        part: (frames, ...) of the way from the last frame in which it was seen.
+        part_p: (frames, ...) of the way from the last frame in which it was measured.
+        part_R: (frames, ...) likewise.
     """
-    return p + part[..., None] * off_p, slerp(_IDENTITY, off_R, part) @ R
+    return p + part_p[..., None] * off_p, slerp(_IDENTITY, off_R, part_R) @ R
 
 
 def _asked_again(

@@ -10,7 +10,7 @@ import numpy as np
 
 from lobstr_hw.features import Bools, Points, reference_frames
 from lobstr_hw.lost_points import follow
-from lobstr_hw.predictors.bridge import NEVER, bent, gone_on
+from lobstr_hw.predictors.bridge import NEVER, bent, gap_part, gone_on
 from lobstr_hw.predictors.gap_memory import FRAMES, Ints
 from lobstr_hw.rotations import Array
 
@@ -57,8 +57,6 @@ def _steps_lost(seen: Bools) -> Ints:
 def _bend(points: Points, role: int, gap: slice, off_p: Array, off_R: Array) -> None:
     """Lead a point over a gap to where it is seen again, in place."""
     p, R = points.p[gap, role], points.R[gap, role]
-    part = np.arange(1, len(p) + 1) / (len(p) + 1)
-    p_bent, R_bent = bent(p, R, off_p, off_R, part)
-    lost_p, lost_R = ~points.valid_p[gap, role], ~points.valid_R[gap, role]
-    p[lost_p], R[lost_R] = p_bent[lost_p], R_bent[lost_R]
+    parts = gap_part(points.valid_p[gap, role]), gap_part(points.valid_R[gap, role])
+    p[...], R[...] = bent(p, R, off_p, off_R, *parts)
     points.valid_p[gap, role] = points.valid_R[gap, role] = True

@@ -174,6 +174,15 @@ def test_a_position_that_is_measured_all_along_stays_when_only_the_rotation_was_
     assert off(run(predictor, taken)[0], run(predictor, lost)[0]) < 1e-4
 
 
+def test_a_position_and_a_rotation_that_are_lost_at_different_times_leave_no_trace(
+    predictor: Predictor,
+) -> None:
+    taken = even_motion(61, PELVIS)
+    whole, late = (out_of_sight(taken, PELVIS, first, 60) for first in (LOST_AT, 40))
+    lost = [replace(a, p=b.p, valid_p=b.valid_p) for a, b in zip(whole, late, strict=True)]
+    assert off(run(predictor, taken)[0], run(predictor, lost)[0]) < 1e-4
+
+
 def test_a_pelvis_that_is_long_lost_still_goes_with_the_head(predictor: Predictor) -> None:
     still = even_motion(1, PELVIS)[0]
     taken = [

@@ -44,6 +44,14 @@ def test_what_moved_evenly_is_where_it_was(role: TrackerRole) -> None:
     assert out.R_ref == pytest.approx(true.R_ref)
 
 
+def test_a_position_and_a_rotation_may_be_lost_at_different_times() -> None:
+    taken = even_motion(80, PELVIS)
+    whole, late = (points(out_of_sight(taken, PELVIS, first, 60)) for first in (10, 40))
+    out = mended(replace(whole, p=late.p, valid_p=late.valid_p), linked(80))
+    assert out.p == pytest.approx(points(taken).p)
+    assert out.R == pytest.approx(points(taken).R)
+
+
 def test_what_is_measured_stays_and_the_recording_is_left_as_it_is() -> None:
     before = points(out_of_sight(even_motion(80, PELVIS), PELVIS, 10, 55))
     kept = before.p.copy()
