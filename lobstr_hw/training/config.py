@@ -75,7 +75,7 @@ class CarriedSettings:
     warp_min: float = 0.7
     warp_max: float = 1.45
     lever_m: float = 0.02
-    dropout_share: float = 0.1
+    dropout_share: float = 0.2
     sitting_share: float = 0.0
     gradient_norm: float = 1.0
 

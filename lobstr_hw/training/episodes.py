@@ -4,7 +4,7 @@ An episode is some chunks of one clip: at its own speed or another, mirrored or 
 off their joints, drifting, and now and then lost. All of it is drawn from one generator.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -12,12 +12,14 @@ import numpy.typing as npt
 from lobstr_hw.features import (
     POINT_ROLES,
     Bools,
+    Points,
     clip_features,
     clip_points,
     mirror_features,
     reference_frames,
 )
 from lobstr_hw.lower_body import mirror_pose_6d, pose_6d, pose_from_6d
+from lobstr_hw.predictors.mended import mended
 from lobstr_hw.rotations import Array, from_6d, heading_angle, to_6d
 from lobstr_hw.trackers import TrackerRole
 from lobstr_hw.training.augmentation import add_tracker_errors
@@ -130,13 +132,10 @@ class EpisodeSource:
         lever[HIPS, UP] = 0.0
         p = p + (R @ lever)[..., 0]
         p, R = add_tracker_errors(p, R, RATE_HZ, config.augmentation, rng)
-        valid = np.ones(p.shape[:2], dtype=bool)
+        points = clip_points(p, R, form=config.feature_form)
         if rng.random() < settings.dropout_share:
-            valid = _dropout(len(p), rng)
-            p, R = _held(p, valid), _held(R, valid)
-        return clip_features(
-            clip_points(p, R, valid, valid, config.feature_form), config.feature_form
-        )
+            points = _with_a_gap(points, rng)
+        return clip_features(points, config.feature_form)
 
 
 def _speed(settings: CarriedSettings, rng: np.random.Generator) -> float:
@@ -159,8 +158,11 @@ def _dropout(frames: int, rng: np.random.Generator) -> Bools:
     return valid
 
 
-def _held(values: Array, valid: Bools) -> Array:
-    """Each role's last good value (frames, 4, ...) where it is lost, as the live program does."""
-    frame = np.arange(len(values))[:, None]
-    last_good = np.maximum.accumulate(np.where(valid, frame, 0), axis=0)
-    return np.asarray(values[last_good, np.arange(values.shape[1])])
+def _with_a_gap(points: Points, rng: np.random.Generator) -> Points:
+    """Points (frames, 4, ...) of which one is lost once: guessed, as it is live meanwhile.
+
+    In half of them the gap is mended, as the live network's past is once the point is back.
+    """
+    valid = _dropout(len(points.p), rng)
+    back = np.full(len(valid), rng.random() < 0.5)
+    return mended(replace(points, valid_p=valid, valid_R=valid), linked=back)
