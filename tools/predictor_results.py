@@ -118,10 +118,8 @@ def _recipe(details: dict[str, Any]) -> str:
     config, data = details["configuration"], details["data"]
     minutes = data["minutes_by_set"]
     sets = ", ".join(f"{name} {value}" for name, value in minutes.items())
-    everybody = " --everybody" if config.get("everybody", False) else ""
     return (
-        f"`lobstr-train DATA --out RUN --recipe {config['recipe']} --seed {config['seed']} "
-        f"--precision {config['precision']}{everybody}`: {details['architecture']} "
+        f"`{_command(config)}`: {details['architecture']} "
         f"({details['parameters']:,} parameters), {_how(config)}, "
         f"{details['steps_done']:,} steps, seed {config['seed']}, products in "
         f"{config['precision']}, {details['wall_s'] / 60.0:.0f} minutes on one thread of a shared "
@@ -134,6 +132,16 @@ def _recipe(details: dict[str, Any]) -> str:
         "trackers from the truth without noise, the true root, lengths on the 1.0 m skeleton. "
         "`network` is FK of what was predicted, `after IK` the shown body with contact lock and "
         f"floor; contact after IK is the lock. Measured {date.today().isoformat()}.\n"
+    )
+
+
+def _command(config: dict[str, Any]) -> str:
+    if config.get("teachers"):
+        return "python tools/train_shipped.py DATA RUNS"
+    everybody = " --everybody" if config.get("everybody", False) else ""
+    return (
+        f"lobstr-train DATA --out RUN --recipe {config['recipe']} --seed {config['seed']} "
+        f"--precision {config['precision']}{everybody}"
     )
 
 
@@ -154,8 +162,16 @@ def _how(config: dict[str, Any]) -> str:
         )
     return (
         f"state carried over long streams: {config['batch']} streams in chunks of "
-        f"{config['window']} frames, loss on every frame (docs/decisions.md)"
+        f"{config['window']} frames, loss on every frame (docs/decisions.md){_taught(config)}"
     )
+
+
+def _taught(config: dict[str, Any]) -> str:
+    teachers = config.get("teachers", [])
+    if not teachers:
+        return ""
+    each = ", ".join(f"GRU {t['hidden_size']} of {t['steps']:,} steps" for t in teachers)
+    return f", {config['taught']:.0%} of it against what {len(teachers)} teachers say ({each})"
 
 
 def _table(trees: dict[str, dict[str, Any]]) -> str:
