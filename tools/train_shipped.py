@@ -19,6 +19,8 @@ TEACHERS = {
     "near": {"hidden_size": 384, "steps": 2400, "seed": 13, "toe": 2.0, "velocity": 9.0},
 }
 """Unlike in size and in what they weigh, so that their errors are unlike."""
+SITTING_SHARE = 0.5
+"""Of the teachers' episodes: what they say of chairs is to be relied on."""
 
 
 def main() -> int:
@@ -46,6 +48,7 @@ def configurations(base: TrainingConfig, out: Path) -> dict[str, TrainingConfig]
             steps=int(row["steps"]),
             seed=int(row["seed"]),
             weights=LossWeights(1.0, row["toe"], row["velocity"], base.weights.contact),
+            carried=replace(base.carried, sitting_share=SITTING_SHARE),
         )
         for name, row in TEACHERS.items()
     }

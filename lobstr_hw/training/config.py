@@ -203,8 +203,8 @@ _CARRIED = TrainingConfig(
     average=0.998,
     mirror_mean=True,
     # the position of three joints guides the legs; the contact gets a gradient that it can feel
-    weights=LossWeights(pose=1.0, toe=1.5, velocity=6.0, contact=0.1),
-    carried=CarriedSettings(sitting_share=0.5),
+    weights=LossWeights(pose=1.0, toe=1.0, velocity=4.5, contact=0.1),
+    carried=CarriedSettings(sitting_share=0.15),
     validate_every=1000,
     checkpoint_every=100,
 )
@@ -217,7 +217,6 @@ _TWO_WAY = replace(
     mirror_mean=False,
     # every chunk is an episode of its own
     carried=CarriedSettings(mean_chunks=1.0, sitting_share=0.5),
-    weights=LossWeights(pose=1.0, toe=1.0, velocity=4.5, contact=0.1),
     validate_every=575,
     checkpoint_every=50,
 )
