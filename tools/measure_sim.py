@@ -45,6 +45,7 @@ class Capture:
     live: LiveSession
     poses: list[SkeletonPose] = field(default_factory=list)
     targets: list[Array] = field(default_factory=list)
+    measured: list[Bools] = field(default_factory=list)
 
     def open(self, body: Body, rate_hz: float, take: str) -> None:
         """Nothing to open."""
@@ -64,6 +65,7 @@ class Capture:
         at = [frame.index(role) for role in TARGETS]
         self.poses.append(pose)
         self.targets.append(frame.p[0, at] / calibration.scale)
+        self.measured.append(frame.valid_p[0, at])
 
     def close(self) -> None:
         """Nothing to close."""
@@ -100,7 +102,8 @@ def _head() -> str:
 `python tools/measure_sim.py`, {date}: the bundled log through the whole program, in-process, with
 the shipped network (times on a busy two-core machine). Two runs of `lobstr-live --sim --fast
 --output bvh:out.bvh` give byte-identical files (`cmp`). The shown body is held against its
-calibrated targets and against the source motion's own joints (`/truth` of the log).
+calibrated targets, where they are in sight, and against the source motion's own joints (`/truth`
+of the log).
 """
 
 
@@ -132,10 +135,11 @@ def body_rows(live: LiveSession, capture: Capture) -> list[tuple[str, str]]:
     bones = np.linalg.norm(p[:, 1:] - p[:, PARENTS[1:]], axis=-1)
     deviation = np.abs(bones - np.linalg.norm(body.offsets[0, 1:], axis=-1)).max()
     rows = [("bone length deviation, max", f"{deviation:.1e} m")]
-    targets = np.stack(capture.targets)
+    targets, measured = np.stack(capture.targets), np.stack(capture.measured)
     for i, role in enumerate(TARGETS):
-        off = np.linalg.norm(p[:, ROLE_JOINT[role]] - targets[:, i], axis=-1)
-        near = in_reach(role, p, targets[:, i], body)
+        there = measured[:, i]  # what is out of sight is shown where the body goes
+        off = np.linalg.norm(p[there, ROLE_JOINT[role]] - targets[there, i], axis=-1)
+        near = in_reach(role, p[there], targets[there, i], body)
         inside = f"{1e3 * off[near].max():.2f} mm" if near.any() else "never in reach"
         rows.append((f"{role} to its target, in reach, max", inside))
         short = f", by {1e3 * np.median(off[~near]):.1f} / {1e3 * off[~near].max():.1f} mm"
