@@ -5,12 +5,15 @@ step to the next is looked at, so there is nothing to remember but the last pose
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+import numpy.typing as npt
 
 from lobstr_hw.features import POINT_ROLES, Bools, Points
 from lobstr_hw.predictors.predictor import Frame
 from lobstr_hw.rotations import Array, heading_angle, rotation_y, transpose
+from lobstr_hw.trackers import TrackerRole
 
 __all__ = ["follow", "seen_points"]
 
@@ -40,9 +43,21 @@ head comes up again."""
 
 def seen_points(frame: Frame) -> Points:
     """The four points of a frame, in the order of the features; not yet in a reference frame."""
-    order = [frame.index(role) for role in POINT_ROLES]
-    valid_p, valid_R = frame.valid_p[:, order], frame.valid_R[:, order]
-    return Points(frame.p[:, order], frame.R[:, order], valid_p, valid_R, frame.R[:, order[0]])
+    order = _order(frame.roles)
+    R = frame.R.take(order, axis=1)
+    return Points(
+        frame.p.take(order, axis=1),
+        R,
+        frame.valid_p.take(order, axis=1),
+        frame.valid_R.take(order, axis=1),
+        R[:, _PELVIS],
+    )
+
+
+@cache
+def _order(roles: tuple[TrackerRole, ...]) -> npt.NDArray[np.int64]:
+    """Where the points of the features stand among roles."""
+    return np.array([roles.index(role) for role in POINT_ROLES], dtype=np.int64)
 
 
 def follow(before: Points, now: Points, seen: Bools) -> Points:
