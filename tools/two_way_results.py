@@ -124,7 +124,7 @@ def _recipe(details: dict[str, Any]) -> str:
         f"({details['parameters']:,} parameters), {details['steps_done']:,} steps of "
         f"{config['batch']} chunks of {config['window']} frames, {minutes:.0f} minutes of motion, "
         f"{details['wall_s'] / 60.0:.0f} minutes on one thread of a busy two-core machine. "
-        "Chosen on the validation part; nothing on a test part.\n\n"
+        "Chosen on the validation part; nothing on a test part, but see `lobstr` about chairs.\n\n"
         "Scored by `python tools/two_way_results.py DATA OUT`: trackers from the truth without "
         "noise, the true root, lengths on the 1.0 m skeleton. Both go through the same "
         "contact lock, floor and IK. Refined is what `lobstr-log export --refine` makes: of every "
