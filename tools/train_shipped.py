@@ -11,14 +11,8 @@ from pathlib import Path
 
 from lobstr_hw.runtime.commands.train import main as lobstr_train
 from lobstr_hw.training.checkpoint import load_checkpoint
-from lobstr_hw.training.config import LossWeights, TrainingConfig, recipe_config, write_config
+from lobstr_hw.training.config import TrainingConfig, recipe_config, write_config
 
-TEACHERS = {
-    "large": {"hidden_size": 512, "steps": 5000, "seed": 11, "toe": 1.5, "velocity": 7.0},
-    "steady": {"hidden_size": 384, "steps": 2400, "seed": 12, "toe": 1.0, "velocity": 9.0},
-    "near": {"hidden_size": 384, "steps": 2400, "seed": 13, "toe": 2.0, "velocity": 9.0},
-}
-"""Unlike in size and in what they weigh, so that their errors are unlike."""
 SITTING_SHARE = 0.5
 """Of the teachers' episodes: what they say of chairs is to be relied on."""
 
@@ -34,25 +28,28 @@ def main() -> int:
     base = recipe_config("carried", everybody=not options.validated)
     for name, config in configurations(base, options.out).items():
         if not _train(options, name, config):
-            print(f"{name} is not finished; the same command goes on", file=sys.stderr)
+            print(f"{name} is not finished. Give the same command again to go on.", file=sys.stderr)
             return 1
     return lobstr_train(["--export", str(options.out / "lobstr"), str(options.out)])
 
 
 def configurations(base: TrainingConfig, out: Path) -> dict[str, TrainingConfig]:
-    """The settings of all runs by name, in the order in which they are trained."""
-    runs = {
-        name: replace(
-            base,
-            hidden_size=int(row["hidden_size"]),
-            steps=int(row["steps"]),
-            seed=int(row["seed"]),
-            weights=LossWeights(1.0, row["toe"], row["velocity"], base.weights.contact),
-            carried=replace(base.carried, sitting_share=SITTING_SHARE),
-        )
-        for name, row in TEACHERS.items()
+    """The settings of all runs by name, in the order in which they are trained.
+
+    The teachers are unlike in size and in what they weigh, so that their errors are unlike.
+    """
+    sitting = replace(base, carried=replace(base.carried, sitting_share=SITTING_SHARE))
+
+    def teacher(hidden_size: int, steps: int, seed: int, **weights: float) -> TrainingConfig:
+        weighed = replace(base.weights, **weights)
+        return replace(sitting, hidden_size=hidden_size, steps=steps, seed=seed, weights=weighed)
+
+    teachers = {
+        "large": teacher(512, 5000, 11, toe=1.5, velocity=7.0),
+        "steady": teacher(384, 2400, 12, toe=1.0, velocity=9.0),
+        "near": teacher(384, 2400, 13, toe=2.0, velocity=9.0),
     }
-    return {**runs, "lobstr": replace(base, teachers=tuple(str(out / name) for name in runs))}
+    return {**teachers, "lobstr": replace(base, teachers=tuple(str(out / n) for n in teachers))}
 
 
 def _train(options: argparse.Namespace, name: str, config: TrainingConfig) -> bool:

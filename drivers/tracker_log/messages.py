@@ -170,16 +170,14 @@ def _maybe_floats(values: list[Any] | None) -> tuple[float, ...] | None:
 
 def state_message(time_ns: int, device: DeviceState) -> bytes:
     """A ``lobstr.TrackerState``."""
-    whole_s, rest_ns = divmod(time_ns, 1_000_000_000)
-    message = {
-        "timestamp": {"sec": whole_s, "nsec": rest_ns},
-        "role": device.role,
-        "tracked": device.tracked,
-        "state": device.state,
-        "battery": device.battery,
-        "buttons": device.buttons,
-    }
-    return json.dumps(message, separators=(",", ":")).encode()
+    return _stamped(
+        time_ns,
+        role=device.role,
+        tracked=device.tracked,
+        state=device.state,
+        battery=device.battery,
+        buttons=device.buttons,
+    )
 
 
 def read_state(data: bytes) -> DeviceState:
@@ -197,13 +195,12 @@ def read_state(data: bytes) -> DeviceState:
 
 def event_message(time_ns: int, event: DeviceEvent) -> bytes:
     """A ``lobstr.Event``."""
+    return _stamped(time_ns, kind=event.kind, serial=event.serial, name=event.name)
+
+
+def _stamped(time_ns: int, **fields: object) -> bytes:
     whole_s, rest_ns = divmod(time_ns, 1_000_000_000)
-    message = {
-        "timestamp": {"sec": whole_s, "nsec": rest_ns},
-        "kind": event.kind,
-        "serial": event.serial,
-        "name": event.name,
-    }
+    message = {"timestamp": {"sec": whole_s, "nsec": rest_ns}, **fields}
     return json.dumps(message, separators=(",", ":")).encode()
 
 

@@ -6,7 +6,7 @@ from lobstr_hw.ik import solve_two_bone
 from lobstr_hw.rotations import Array, rotation_between
 from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint
 
-__all__ = ["LEGS", "plant", "rotations_to_ankles", "sockets"]
+__all__ = ["LEGS", "LEG_M", "plant", "rotations_to_ankles", "sockets"]
 
 LEGS = np.array(
     [
@@ -19,6 +19,8 @@ LEGS = np.array(
 _SOCKETS: Array = STANDARD_OFFSETS[LEGS[:, 0]]
 _THIGH = float(-STANDARD_OFFSETS[Joint.LEFT_LOWER_LEG, 1])
 _SHIN = float(-STANDARD_OFFSETS[Joint.LEFT_FOOT, 1])
+LEG_M = _THIGH + _SHIN
+"""Hip joint to ankle, the knee straight."""
 
 
 def plant(p_hips: Array, R_hips: Array, p_ankles: Array, bend_m: Array | float = 0.0) -> Array:
@@ -29,7 +31,7 @@ def plant(p_hips: Array, R_hips: Array, p_ankles: Array, bend_m: Array | float =
     """
     arm = p_ankles - sockets(p_hips, R_hips)
     level = np.hypot(arm[..., 0], arm[..., 2])
-    highest = np.sqrt(np.maximum((_THIGH + _SHIN) ** 2 - level**2, 0.0))
+    highest = np.sqrt(np.maximum(LEG_M**2 - level**2, 0.0))
     missing = np.max(-arm[..., 1] - highest, axis=-1) + bend_m
     drop = 0.5 * (missing + np.hypot(missing, bend_m))  # a rounded maximum of this and zero
     return np.asarray(p_hips - drop[..., None] * np.array([0.0, 1.0, 0.0]))

@@ -187,7 +187,11 @@ class TrainingConfig:
         if self.average > 0.0 and self.recipe == "paper":
             raise ModelError("average is not of the recipe paper: set it to 0, or take another.")
         if self.teachers and self.recipe != "carried":
-            raise ModelError(f"teachers are for the recipe carried: {self.recipe} has none.")
+            raise ModelError(
+                f"teachers are for the recipe carried: {self.recipe} has none. Leave --teacher out."
+            )
+        if not 0.0 <= self.taught <= 1.0:
+            raise ModelError(f"taught is a share of the loss: {self.taught:g} is not in 0 to 1.")
 
 
 _CARRIED = TrainingConfig(

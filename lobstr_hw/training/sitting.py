@@ -11,24 +11,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from lobstr_hw.features import POINT_ROLES, reference_frames
+from lobstr_hw.ik.vectors import rotate
 from lobstr_hw.lower_body import leg_points_in_reference, pose_6d, pose_from_6d
 from lobstr_hw.rotations import Array, rotation_x, rotation_y, transpose
 from lobstr_hw.simulation.footsteps import minimum_jerk
-from lobstr_hw.simulation.legs import rotations_to_ankles, sockets
-from lobstr_hw.skeleton import STANDARD_OFFSETS, Joint
+from lobstr_hw.simulation.legs import LEG_M, rotations_to_ankles, sockets
 from lobstr_hw.trackers import TrackerRole
 
 __all__ = ["Sitting", "sat_down"]
 
 HIPS, HEAD = POINT_ROLES.index(TrackerRole.PELVIS), POINT_ROLES.index(TrackerRole.HEAD)
 HANDS = [POINT_ROLES.index(r) for r in (TrackerRole.LEFT_HAND, TrackerRole.RIGHT_HAND)]
-LEG_M = float(-STANDARD_OFFSETS[Joint.LEFT_LOWER_LEG, 1] - STANDARD_OFFSETS[Joint.LEFT_FOOT, 1])
 STRETCHED, FOLDED = 0.995, 0.28
 """Shares of a leg between which hip and ankle may be apart."""
 GOING_M_S = 0.3
+"""Who goes about faster, in the mean, does not sit."""
 SEATS_M = (0.42, 0.64)
 """Heights of the hips on a chair."""
 LOWEST_HAND_M = 0.15
+"""Hands that hang are not lowered to the floor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +100,7 @@ def sat_down(
     new_p, new_R = _points(p, R, how, share)
     joints = pose_from_6d(pose)
     R_ref = reference_frames(R[:, HIPS])[:, None]
-    ankles = p[:, None, HIPS] + _rotate(R_ref, leg_points_in_reference(joints)[:, :, 2])
+    ankles = p[:, None, HIPS] + rotate(R_ref, leg_points_in_reference(joints)[:, :, 2])
     apart = np.linalg.norm(ankles - sockets(new_p[:, HIPS], new_R[:, HIPS]), axis=-1) / LEG_M
     before = np.linalg.norm(ankles - sockets(p[:, HIPS], R[:, HIPS]), axis=-1) / LEG_M
     # some captures' legs are a little longer than the standard's: no longer than they were
@@ -125,14 +126,14 @@ def _points(p: Array, R: Array, how: Sitting, share: Array) -> tuple[Array, Arra
     R_ref = reference_frames(R[:, HIPS])
     leaning = how.lean * share + 4.0 * how.bow * share * (1.0 - share)
     down = share[:, None] * np.array([0.0, -how.depth_m, -how.back_m])
-    hips = p[:, HIPS] + _rotate(R_ref, down)
+    hips = p[:, HIPS] + rotate(R_ref, down)
     turned = {
         HIPS: how.pelvis * leaning - how.slump * share,
         HEAD: how.gaze * leaning,
         **dict.fromkeys(HANDS, leaning),
     }
     trunk = _about_x(R_ref, leaning)
-    new_p = hips[:, None] + _rotate(trunk[:, None], p - p[:, HIPS : HIPS + 1])
+    new_p = hips[:, None] + rotate(trunk[:, None], p - p[:, HIPS : HIPS + 1])
     new_p[:, HANDS, 1] += (how.hands_m * share)[:, None]
     new_p[:, HANDS, 1] = np.maximum(new_p[:, HANDS, 1], np.minimum(p[:, HANDS, 1], LOWEST_HAND_M))
     new_R = np.stack([_about_x(R_ref, turned[i]) @ R[:, i] for i in range(len(turned))], axis=1)
@@ -164,7 +165,3 @@ def _pose(
 def _about_x(R_ref: Array, angle: Array) -> Array:
     """Forwards by an angle (frames,), about the left of a heading (frames, 3, 3)."""
     return np.asarray(R_ref @ rotation_x(angle) @ transpose(R_ref))
-
-
-def _rotate(R: Array, v: Array) -> Array:
-    return np.asarray((R @ v[..., None])[..., 0])

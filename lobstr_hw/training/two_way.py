@@ -25,11 +25,12 @@ from lobstr_hw.training.carried_losses import (
 from lobstr_hw.training.checkpoint import Run
 from lobstr_hw.training.config import TrainingConfig, TwoWaySettings
 from lobstr_hw.training.dataset import Clips, Float32
-from lobstr_hw.training.devices import device_of, precision_of
+from lobstr_hw.training.devices import precision_of
 from lobstr_hw.training.episodes import EpisodeSource
 from lobstr_hw.training.kinematics import toes_in_reference
 from lobstr_hw.training.mirrored import MirrorMean
 from lobstr_hw.training.network import LobstrNetwork
+from lobstr_hw.training.precision import is_fast
 from lobstr_hw.training.recurrence import run_gru_both_ways
 from lobstr_hw.training.schedule import set_learning_rate
 
@@ -116,7 +117,7 @@ def counted_frames(
 def _through(network: LobstrNetwork, z: Tensor, config: TrainingConfig) -> tuple[Tensor, Tensor]:
     """Pose and logits of chunks, in the precision of the settings; the state is float32."""
     gru = network.encoder
-    if config.precision == "bf16" and isinstance(gru, nn.GRU) and device_of(config).type == "cpu":
+    if is_fast(gru, config):
         return network.heads(run_gru_both_ways(gru, z))
     with precision_of(config):
         pose, logits, _ = network(z, last_only=False)

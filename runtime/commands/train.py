@@ -23,9 +23,11 @@ __all__ = ["main"]
 
 EXAMPLES = """examples:
   lobstr-train DATA --out runs/1 --seed 1      train the paper's recipe on the default split
-  lobstr-train DATA --out runs/2 --recipe carried     the small network that ships
+  lobstr-train DATA --out runs/2 --recipe carried     a small network for live use
   lobstr-train DATA --out runs/1 --resume      go on after a stop
   lobstr-train --export runs/1 lobstr.onnx     write lobstr.onnx and lobstr.json
+  lobstr-train DATA --out runs/4 --recipe carried --teacher runs/2 --teacher runs/3
+                                               the same, which also listens to others
   torchrun --nproc-per-node 4 -m lobstr_hw.runtime.commands.train DATA --out runs/3
                                                four processes share each batch
 """

@@ -1,16 +1,17 @@
 """A point that comes back: the state is as if it had never been quite lost."""
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from support.even_motion import even_motion, out_of_sight
+from support.stepping import moved, run
 
-from lobstr_hw.predictors import Frame, Prediction, Predictor, State, bridge, load_predictor
+from lobstr_hw.predictors import Predictor, State, bridge, load_predictor
 from lobstr_hw.predictors.gap_memory import FRAMES
-from lobstr_hw.rotations import Array, geodesic_angle, rotation_y
+from lobstr_hw.rotations import geodesic_angle, rotation_y
 from lobstr_hw.skeleton import Body
 from lobstr_hw.trackers import FOUR_POINTS, TrackerRole
 
@@ -24,26 +25,9 @@ def predictor() -> Predictor:
     return load_predictor("lobstr")
 
 
-def run(
-    predictor: Predictor, sequence: Sequence[Frame], state: State | None = None
-) -> tuple[State, list[Prediction]]:
-    state = predictor.start(Body.standard(len(sequence[0].p))) if state is None else state
-    said = []
-    for frame in sequence:
-        state, prediction = predictor.step(state, frame)
-        said.append(prediction)
-    return state, said
-
-
 def off(a: State, b: State) -> float:
     """How far apart two hidden states are at most."""
     return float(np.abs(a["hidden"] - b["hidden"]).max())
-
-
-def moved(frame: Frame, T: Array) -> Frame:
-    R = T[:, None, :3, :3]
-    p = (R @ frame.p[..., None])[..., 0] + T[:, None, :3, 3]
-    return replace(frame, p=p, R=R @ frame.R)
 
 
 def unbridged(monkeypatch: pytest.MonkeyPatch, call: Callable[[], State]) -> State:

@@ -5,12 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from support.motions import walking
+from support.stepping import moved, run
 
 from lobstr_hw.motion import Motion
-from lobstr_hw.predictors import Frame, Prediction, Predictor, State, load_predictor
+from lobstr_hw.predictors import Frame, Predictor, load_predictor
 from lobstr_hw.predictors.lobstr import softmax_contact
 from lobstr_hw.rotations import Array, geodesic_angle, rotation_y
-from lobstr_hw.skeleton import Body, Joint
+from lobstr_hw.skeleton import Joint
 from lobstr_hw.trackers import FOUR_POINTS, ROLE_JOINT, TrackerRole
 
 
@@ -27,23 +28,6 @@ def frames(motions: Sequence[Motion], roles: tuple[TrackerRole, ...] = FOUR_POIN
     R = np.stack([pose[1][:, joints] for pose in poses], axis=1)
     ok = np.ones(p.shape[1:3], dtype=bool)
     return [Frame(i / 45.0, roles, p[i], R[i], ok, ok) for i in range(len(p))]
-
-
-def run(
-    predictor: Predictor, sequence: Sequence[Frame], state: State | None = None
-) -> tuple[State, list[Prediction]]:
-    state = predictor.start(Body.standard(len(sequence[0].p))) if state is None else state
-    said = []
-    for frame in sequence:
-        state, prediction = predictor.step(state, frame)
-        said.append(prediction)
-    return state, said
-
-
-def moved(frame: Frame, T: Array) -> Frame:
-    R = T[:, None, :3, :3]
-    p = (R @ frame.p[..., None])[..., 0] + T[:, None, :3, 3]
-    return Frame(frame.time_s, frame.roles, p, R @ frame.R, frame.valid_p, frame.valid_R)
 
 
 def play_space_move() -> Array:
