@@ -34,7 +34,9 @@ __all__ = [
     "transpose",
 ]
 
-_YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
+_YZXY = np.array([1, 2, 0, 1])
+"""A vector's numbers so that the first three are y, z, x and the last three z, x, y."""
+_TINY = np.finfo(np.float64).tiny
 HEADING_MINIMUM = 0.2
 """Under this the pelvis is too close to upside down for its heading to be told."""
 
@@ -48,7 +50,7 @@ def normalize(v: Array) -> Array:
     """Vectors (..., 3) at length 1; a zero vector stays zero."""
     # in the predictor's step np.linalg.norm takes three times as long
     length = np.sqrt(np.einsum("...i,...i->...", v, v))[..., None]
-    return np.asarray(v / np.where(length > 0.0, length, 1.0))
+    return np.asarray(v / np.maximum(length, _TINY))
 
 
 def to_6d(R: Array) -> Array:
@@ -62,7 +64,8 @@ def from_6d(r6: Array) -> Array:
     y = r6[..., 3:]
     y = normalize(y - np.einsum("...i,...i->...", y, z)[..., None] * z)
     # written out: in the predictor's step np.cross takes as long as the network
-    x = y[..., _YZX] * z[..., _ZXY] - y[..., _ZXY] * z[..., _YZX]
+    y_turned, z_turned = y[..., _YZXY], z[..., _YZXY]
+    x = y_turned[..., :3] * z_turned[..., 1:] - y_turned[..., 1:] * z_turned[..., :3]
     return np.stack([x, y, z], axis=-1)
 
 

@@ -124,7 +124,8 @@ def prediction_from_6d(pose: npt.NDArray[Any], logits: npt.NDArray[Any]) -> Pred
     """The network's numbers (n, 48) and (n, 4) as rotations and probabilities."""
     joints = pose_from_6d(pose.astype(np.float64))  # (n, 2, 4, 3, 3): C, U, L, F
     C = joints[:, :, 0]
-    legs = np.concatenate([(C @ joints[:, :, 1])[:, :, None], joints[:, :, 2:]], axis=2)
+    legs = joints[:, :, 1:]
+    legs[:, :, 0] = C @ legs[:, :, 0]
     return Prediction(
         R=legs.reshape(len(legs), len(GIVES), 3, 3), contact=softmax_contact(logits), C=C
     )

@@ -18,8 +18,8 @@ from lobstr_hw.errors import ModelError
 from lobstr_hw.lower_body import POSE_SIZE
 from lobstr_hw.predictors.weights import NetworkCard, load_network, write_card
 from lobstr_hw.training.config import STEPPED_KINDS
-from lobstr_hw.training.mirrored import MirrorMean, mirror_matrices, mirror_nodes
-from lobstr_hw.training.network import CONTACT_SIZE, LobstrNetwork
+from lobstr_hw.training.mirrored import MirrorMean, mirrored_weights
+from lobstr_hw.training.network import CONTACT_SIZE, LATENT_SIZE, LobstrNetwork
 from lobstr_hw.training.onnx_graph import graph_model, value
 from lobstr_hw.training.step_graphs import step_nodes
 
@@ -91,27 +91,25 @@ def stored(network: Stepped) -> Stepped:
 
 
 def _model(network: LobstrNetwork | MirrorMean) -> onnx.ModelProto:
-    nodes = step_nodes(network.kind)
     if isinstance(network, MirrorMean):
-        weights = _weights(network.network)
-        weights |= {k: t.numpy() for k, t in mirror_matrices(len(weights["W_x"])).items()}
-        nodes = mirror_nodes(nodes)
+        inner, sides = network.network, 2
+        weights = mirrored_weights(_weights(inner))
     else:
-        weights = _weights(network)
-    matrices = [k for k, w in weights.items() if w.ndim > 1]
-    state = network.state_size
+        inner, sides = network, 1
+        weights = _weights(inner)
+    nodes, sizes = step_nodes(inner.kind, inner.state_size, LATENT_SIZE, sides)
     return graph_model(
         "lobstr_step",
         nodes,
-        [value("x", "n", len(weights["W_x"])), value("h", "n", state)],
+        [value("x", "n", len(weights["W_x"])), value("h", "n", network.state_size)],
         [
-            value("h_next", "n", state),
+            value("h_next", "n", network.state_size),
             value("pose", "n", POSE_SIZE),
             value("contact", "n", CONTACT_SIZE),
         ],
         weights,
-        matrices,
-        {"one": np.array(1.0, dtype=np.float32), "half": np.array(0.5, dtype=np.float32)},
+        [k for k, w in weights.items() if w.ndim > 1],
+        sizes,
     )
 
 
@@ -127,9 +125,7 @@ def _weights(network: LobstrNetwork) -> dict[str, Float32]:
         "b_h": cell["cell.bias_hh_l0"],
         "W_latent": network.latent.weight.T,
         "b_latent": network.latent.bias,
-        "W_pose": network.pose.weight.T,
-        "b_pose": torch.add(network.pose.bias, network.output_mean),
-        "W_contact": network.contact.weight.T,
-        "b_contact": network.contact.bias,
+        "W_heads": torch.cat([network.pose.weight, network.contact.weight]).T,
+        "b_heads": torch.cat([network.pose.bias + network.output_mean, network.contact.bias]),
     }
     return {k: t.detach().float().contiguous().numpy() for k, t in tensors.items()}

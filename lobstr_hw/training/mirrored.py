@@ -4,20 +4,22 @@ One set of weights, two states. At batch 1 a step's time goes into reading the w
 second answer costs little; what it takes away is what one side of the body has learnt by chance.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
+import numpy.typing as npt
 import torch
-from onnx import NodeProto
+from scipy.linalg import block_diag
 from torch import Tensor, nn
 
 from lobstr_hw.features import mirror_features
 from lobstr_hw.lower_body import POSE_SIZE, mirror_pose_6d
 from lobstr_hw.training.config import TrainingConfig
 from lobstr_hw.training.network import LobstrNetwork
-from lobstr_hw.training.onnx_graph import node
 
-__all__ = ["MirrorMean", "Step", "both_sides", "mirror_matrices", "mirror_nodes", "shipped"]
+__all__ = ["MirrorMean", "Step", "both_sides", "mirror_matrices", "mirrored_weights", "shipped"]
+
+Float32 = npt.NDArray[np.float32]
 
 Step = Callable[[Tensor, Tensor | None], tuple[Tensor, Tensor, Tensor]]
 """Input and state -> pose, contact logits and state."""
@@ -76,31 +78,19 @@ def shipped(network: LobstrNetwork, config: TrainingConfig) -> LobstrNetwork | M
     return MirrorMean(network) if config.mirror_mean else network
 
 
-_INNER = ("x", "h", "h_next", "pose", "contact")
+def mirrored_weights(weights: Mapping[str, Float32]) -> dict[str, Float32]:
+    """The weights of a step for both sides (:mod:`lobstr_hw.training.step_graphs`).
 
-
-def mirror_nodes(step: list[NodeProto]) -> list[NodeProto]:
-    """The step of a network around which both sides' rows are put together and parted again."""
-    for inner in step:
-        for names in (inner.input, inner.output):
-            names[:] = [f"both_{name}" if name in _INNER else name for name in names]
-    return [
-        node("MatMul", "x mirror_x", "x_mirrored"),
-        node("Concat", "x x_mirrored", "both_x", axis=0),
-        node("Split", "h", "h_here h_mirrored", axis=1),
-        node("Concat", "h_here h_mirrored", "both_h", axis=0),
-        *step,
-        node("Split", "both_h_next", "h_next_here h_next_mirrored", axis=0),
-        node("Concat", "h_next_here h_next_mirrored", "h_next", axis=1),
-        *_mean("pose"),
-        *_mean("contact"),
-    ]
-
-
-def _mean(name: str) -> list[NodeProto]:
-    return [
-        node("Split", f"both_{name}", f"{name}_here {name}_there", axis=0),
-        node("MatMul", f"{name}_there mirror_{name}", f"{name}_back"),
-        node("Add", f"{name}_here {name}_back", f"{name}_sum"),
-        node("Mul", f"{name}_sum half", name),
-    ]
+    The mirror images of input and answer are signs and orders, so they go into the matrices: W_x
+    makes both sides' rows of one row of x, W_heads the mean answer of both sides' latent numbers.
+    """
+    M = {name: t.numpy() for name, t in mirror_matrices(len(weights["W_x"])).items()}
+    back = block_diag(M["mirror_pose"], M["mirror_contact"]).astype(np.float32)
+    W_x, b_x, W, b = (weights[name] for name in ("W_x", "b_x", "W_heads", "b_heads"))
+    return {
+        **weights,
+        "W_x": np.concatenate([W_x, M["mirror_x"] @ W_x], axis=1),
+        "b_x": np.tile(b_x, 2),
+        "W_heads": 0.5 * np.concatenate([W, W @ back]),
+        "b_heads": 0.5 * (b + b @ back),
+    }
