@@ -1,12 +1,10 @@
 """Tables 1, 2 and 3 of the paper on this project's data and split.
 
-    python tools/paper_tables.py DATA OUT [--table 1|2|3 ...] [--steps 250] [--seed 1] [--whole]
-        [--write]
+    python tools/paper_tables.py DATA OUT [--table 1|2|3 ...] [--steps 1500] [--seed 1] [--write]
 
 DATA is the folder with one folder per set. What is not trained yet is trained, a run's folder per
 row in OUT; a stopped command goes on where it was, and a larger number of steps goes on from the
-smaller one. --whole adds the GRU with all of the paper's 1,500 steps to Table 1. With --write the
-sections are put into docs/results.md, else they are printed.
+smaller one. With --write the sections are put into docs/results.md, else they are printed.
 """
 
 import argparse
@@ -20,7 +18,7 @@ from pathlib import Path
 
 import torch
 from paper_logs import CLIPS, LONGEST_S, STATURES_CM, Scored, Worn, motions, recordings, scored
-from paper_rows import SETTINGS, TABLES, WHOLE, Trained, train_missing, trained
+from paper_rows import BASE, TABLES, Trained, train_missing, trained
 from paper_scores import cost_of, scores
 from results_page import write_section
 from split_clips import truths
@@ -103,37 +101,33 @@ def main() -> int:
     parser.add_argument("data", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--table", type=int, choices=(1, 2, 3), action="append")
-    parser.add_argument("--steps", type=int, default=250)
+    parser.add_argument("--steps", type=int, default=BASE.steps)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--every", type=float, default=5.0, help="seconds; one of them is scored")
     parser.add_argument("--logs-seed", type=int, default=9000)
-    parser.add_argument("--whole", action="store_true", help="Table 1: also 1,500 steps")
     parser.add_argument("--cache", type=Path, help="retargeted clips (OUT/cache)")
     parser.add_argument("--write", action="store_true")
     args = parser.parse_args()
     torch.set_num_threads(1)
     tables = args.table or [1, 2, 3]
-    labels = {table: dict(TABLES[table]) for table in tables}
-    if args.whole and 1 in tables:
-        labels[1][WHOLE] = "GRU, the whole recipe"
-    for row in dict.fromkeys(row for table in tables for row in labels[table]):
-        steps = SETTINGS[WHOLE].steps if row == WHOLE else args.steps
-        train_missing(row, args.data, args.out, args.cache or args.out / "cache", steps, args.seed)
+    cache = args.cache or args.out / "cache"
+    for row in dict.fromkeys(row for table in tables for row in TABLES[table]):
+        train_missing(row, args.data, args.out, cache, args.steps, args.seed)
     sources = Sources(args.data, args.out, args.every, args.logs_seed)
     for table in tables:
-        text = _section(table, sources, labels[table])
+        text = _section(table, sources)
         print(text)
         if args.write:
             write_section(text)
     return 0
 
 
-def _section(table: int, sources: Sources, labels: dict[str, str]) -> str:
-    rows = {row: trained(row, sources.out) for row in labels}
+def _section(table: int, sources: Sources) -> str:
+    rows = {row: trained(row, sources.out) for row in TABLES[table]}
     parts = [TITLES[table], "", _head(table, sources, rows), ""]
     for part, title in PARTS.items():
         parts += [f"### {title} (`{part}`)", ""]
-        parts += [_part_table(sources, rows, labels, part), ""]
+        parts += [_part_table(sources, rows, TABLES[table], part), ""]
     if table == 1:
         parts += [_cost_table(rows), ""]
     if table == 3:
@@ -146,18 +140,18 @@ def _head(table: int, sources: Sources, rows: dict[str, Trained]) -> str:
     data = json.loads((sources.out / next(iter(rows)) / "data.json").read_text(encoding="utf-8"))
     today = datetime.datetime.now(tz=datetime.UTC).date()
     fallen = config.learning_rate_decay**run.step
-    command = f"DATA OUT --table {table} --steps {run.step}" + " --whole" * (WHOLE in rows)
+    least = min(row.run.step for row in rows.values())
+    few = f"As few as {least:,} steps where the paper has {BASE.steps:,}. "
+    command = f"DATA OUT --table {table} --steps {run.step}"
     text = f"""All rows alike: split `{data["split"]}`, {data["clips"]} clips or pieces of clips,
     {sum(data["minutes_by_set"].values()):.0f} minutes before mirroring; batches of {config.batch}
     windows of {config.window} frames from zero, loss on the last frame, drifting tracker errors,
     Adam from {config.learning_rate:g} times {config.learning_rate_decay} a step (to {fallen:.2f}
     of it at the end), {config.precision} products, hidden {config.hidden_size}, latent 128.
-    **{run.step} steps where the paper has 1,500, and one seed**: rows that are close are not in
+    **{few if least < BASE.steps else ""}One seed**: rows that are close are not in
     order. Scored by windows with products as in training, one second in every
     {sources.every_s:g} of each clip, trackers from the truth; the network alone, before lock and
     IK. Minutes are of one thread of a shared two-core machine."""
-    if WHOLE in rows:
-        text += " The last row is the paper's recipe as it is: 1,500 steps, times 0.999 a step."
     return f"`python tools/paper_tables.py {command}`, {today}.\n\n{' '.join(text.split())}"
 
 
