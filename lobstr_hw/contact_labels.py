@@ -13,7 +13,14 @@ import numpy.typing as npt
 from lobstr_hw.rotations import Array
 from lobstr_hw.skeleton import TOE_BASE_HEIGHT
 
-__all__ = ["contact_labels", "debounced", "local_floor", "paper_contact_labels"]
+__all__ = [
+    "HEIGHT_M",
+    "SPEED_M_S",
+    "contact_labels",
+    "debounced",
+    "local_floor",
+    "paper_contact_labels",
+]
 
 Bools = npt.NDArray[np.bool_]
 
@@ -24,10 +31,12 @@ SHORTEST_S = 0.1
 PAPER_HEIGHT_M = 0.01
 
 
-def contact_labels(p_toes: Array, rate_hz: float) -> Bools:
+def contact_labels(
+    p_toes: Array, rate_hz: float, height_m: float = HEIGHT_M, speed_m_s: float = SPEED_M_S
+) -> Bools:
     """Contacts (frames, 2) of the toe bases (frames, 2, 3), metres on the standard skeleton."""
-    low = p_toes[..., 1] - local_floor(p_toes[..., 1], rate_hz)[:, None] < HEIGHT_M
-    slow = _speed(p_toes, rate_hz) < SPEED_M_S
+    low = p_toes[..., 1] - local_floor(p_toes[..., 1], rate_hz)[:, None] < height_m
+    slow = _speed(p_toes, rate_hz) < speed_m_s
     return debounced(low & slow, round(SHORTEST_S * rate_hz + 0.5))
 
 
