@@ -38,10 +38,15 @@ def configurations(base: TrainingConfig, out: Path) -> dict[str, TrainingConfig]
 
     The teachers are unlike in size and in what they weigh, so that their errors are unlike.
     """
-    sitting = replace(base, carried=replace(base.carried, sitting_share=SITTING_SHARE))
+    sitting = replace(
+        base,
+        carried=replace(
+            base.carried, sitting_share=SITTING_SHARE, stride_share=0.0, borrowed_hands=0.0
+        ),
+    )
 
     def teacher(hidden_size: int, steps: int, seed: int, **weights: float) -> TrainingConfig:
-        weighed = replace(base.weights, **weights)
+        weighed = replace(base.weights, pose=1.0, **weights)
         return replace(sitting, hidden_size=hidden_size, steps=steps, seed=seed, weights=weighed)
 
     teachers = {

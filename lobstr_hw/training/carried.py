@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from lobstr_hw.features import clip_features, clip_points, reference_frames
 from lobstr_hw.rotations import heading_angle
 from lobstr_hw.training.averaging import add_to_average, with_average
+from lobstr_hw.training.borrowed_hands import with_borrowed_hands
 from lobstr_hw.training.carried_losses import (
     ChunkTargets,
     carried_losses,
@@ -78,7 +79,10 @@ def _train_step(
     rate = set_learning_rate(run.optimizer, config, run.step)
     run.network.train()
     goes_on = torch.from_numpy(~chunk.first)[None, :, None]
-    x = torch.from_numpy((chunk.x - run.stats.input_mean) / run.stats.input_scale)
+    seen = with_borrowed_hands(
+        chunk.x, config.carried.borrowed_hands, np.random.default_rng([config.seed, run.step])
+    )
+    x = torch.from_numpy((seen - run.stats.input_mean) / run.stats.input_scale)
     pose, logits, hidden = over_chunk(run.network, x, run.carried.hidden * goes_on, config)
     truth = _targets(chunk, config)
     terms = carried_losses(pose, logits, truth, config.weights)

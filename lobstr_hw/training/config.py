@@ -63,6 +63,9 @@ class CarriedSettings:
             saw it err would not believe it (measured: toes 3 cm too low in whoever stands low).
         dropout_share: of the episodes in which one role is lost for a while.
         sitting_share: of the episodes in which who only stands sits down now and then.
+        stride_share: of the episodes in which somebody else's strides are taken.
+        borrowed_hands: share of the streams whose hands are another stream's, in each chunk anew;
+            teachers see the true ones.
         gradient_norm: longer gradients are cut; a carried state can explode.
     """
 
@@ -77,6 +80,8 @@ class CarriedSettings:
     lever_m: float = 0.02
     dropout_share: float = 0.2
     sitting_share: float = 0.0
+    stride_share: float = 0.0
+    borrowed_hands: float = 0.0
     gradient_norm: float = 1.0
 
 
@@ -207,8 +212,8 @@ _CARRIED = TrainingConfig(
     average=0.998,
     mirror_mean=True,
     # the position of three joints guides the legs; the contact gets a gradient that it can feel
-    weights=LossWeights(pose=1.0, toe=1.0, velocity=4.5, contact=0.1),
-    carried=CarriedSettings(sitting_share=0.15),
+    weights=LossWeights(pose=2.5, toe=1.0, velocity=6.0, contact=0.1),
+    carried=CarriedSettings(sitting_share=0.15, stride_share=0.4, borrowed_hands=0.3),
     validate_every=1000,
     checkpoint_every=100,
 )
@@ -219,6 +224,7 @@ _TWO_WAY = replace(
     steps=2300,
     window=120,
     mirror_mean=False,
+    weights=LossWeights(pose=1.0, toe=1.0, velocity=4.5, contact=0.1),
     # every chunk is an episode of its own
     carried=CarriedSettings(mean_chunks=1.0, sitting_share=0.5),
     validate_every=575,

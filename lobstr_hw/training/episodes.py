@@ -27,6 +27,7 @@ from lobstr_hw.training.balance import frame_weights
 from lobstr_hw.training.config import CarriedSettings, TrainingConfig
 from lobstr_hw.training.dataset import RATE_HZ, Clips, Float32
 from lobstr_hw.training.sitting import sat_down
+from lobstr_hw.training.strides import Stride, with_other_strides
 
 __all__ = ["Episode", "EpisodeSource"]
 
@@ -87,6 +88,9 @@ class EpisodeSource:
         share = self._config.carried.sitting_share
         if share > 0.0 and rng.random() < share:
             p, R, pose = sat_down(p, R, pose, RATE_HZ, rng)
+        share = self._config.carried.stride_share
+        if share > 0.0 and rng.random() < share:
+            p, pose = with_other_strides(p, R, pose, contact, RATE_HZ, Stride.drawn(rng))
         yaw = heading_angle(reference_frames(R[:, 0]))[0]
         x = self._features(p, R, rng)
         episode = Episode(

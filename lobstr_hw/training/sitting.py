@@ -12,18 +12,16 @@ import numpy as np
 
 from lobstr_hw.features import POINT_ROLES, reference_frames
 from lobstr_hw.ik.vectors import rotate
-from lobstr_hw.lower_body import leg_points_in_reference, pose_6d, pose_from_6d
-from lobstr_hw.rotations import Array, rotation_x, rotation_y, transpose
+from lobstr_hw.lower_body import pose_from_6d
+from lobstr_hw.rotations import Array, rotation_x, transpose
 from lobstr_hw.simulation.footsteps import minimum_jerk
-from lobstr_hw.simulation.legs import LEG_M, rotations_to_ankles, sockets
 from lobstr_hw.trackers import TrackerRole
+from lobstr_hw.training.replaced_legs import HIPS, ankles_of, apart, can_reach, pose_to_ankles
 
 __all__ = ["Sitting", "sat_down"]
 
-HIPS, HEAD = POINT_ROLES.index(TrackerRole.PELVIS), POINT_ROLES.index(TrackerRole.HEAD)
+HEAD = POINT_ROLES.index(TrackerRole.HEAD)
 HANDS = [POINT_ROLES.index(r) for r in (TrackerRole.LEFT_HAND, TrackerRole.RIGHT_HAND)]
-STRETCHED, FOLDED = 0.995, 0.28
-"""Shares of a leg between which hip and ankle may be apart."""
 GOING_M_S = 0.3
 """Who goes about faster, in the mean, does not sit."""
 SEATS_M = (0.42, 0.64)
@@ -99,14 +97,11 @@ def sat_down(
     share = _up_and_down(len(p), rate_hz, rng)
     new_p, new_R = _points(p, R, how, share)
     joints = pose_from_6d(pose)
-    R_ref = reference_frames(R[:, HIPS])[:, None]
-    ankles = p[:, None, HIPS] + rotate(R_ref, leg_points_in_reference(joints)[:, :, 2])
-    apart = np.linalg.norm(ankles - sockets(new_p[:, HIPS], new_R[:, HIPS]), axis=-1) / LEG_M
-    before = np.linalg.norm(ankles - sockets(p[:, HIPS], R[:, HIPS]), axis=-1) / LEG_M
-    # some captures' legs are a little longer than the standard's: no longer than they were
-    if (apart > np.maximum(STRETCHED, before)).any() or (apart < FOLDED).any():
+    ankles = ankles_of(p, R, joints)
+    if not can_reach(apart(new_p, new_R, ankles), apart(p, R, ankles)):
         return p, R, pose
-    return new_p, new_R, _pose(joints, R_ref, new_p, new_R, ankles, how.splay * share)
+    R_ref = reference_frames(R[:, HIPS])[:, None]
+    return new_p, new_R, pose_to_ankles(joints, R_ref, new_p, new_R, ankles, how.splay * share)
 
 
 def _up_and_down(frames: int, rate_hz: float, rng: np.random.Generator) -> Array:
@@ -138,28 +133,6 @@ def _points(p: Array, R: Array, how: Sitting, share: Array) -> tuple[Array, Arra
     new_p[:, HANDS, 1] = np.maximum(new_p[:, HANDS, 1], np.minimum(p[:, HANDS, 1], LOWEST_HAND_M))
     new_R = np.stack([_about_x(R_ref, turned[i]) @ R[:, i] for i in range(len(turned))], axis=1)
     return new_p, new_R
-
-
-def _pose(
-    joints: Array, R_ref: Array, new_p: Array, new_R: Array, ankles: Array, splay: Array
-) -> Array:
-    """The 48 numbers (frames, 48) of legs whose feet stay, under hips that have moved."""
-    upper = R_ref @ joints[:, :, 0] @ joints[:, :, 1]
-    lower = upper @ joints[:, :, 2]
-    foot = lower @ joints[:, :, 3]
-    out = np.stack([rotation_y(splay), rotation_y(-splay)], axis=1)[:, :, None]
-    like = out @ np.stack([upper, lower], axis=2)
-    legs = rotations_to_ankles(new_p[:, HIPS], new_R[:, HIPS], ankles, like)
-    C = transpose(reference_frames(new_R[:, HIPS])) @ new_R[:, HIPS]
-    to_hips = transpose(new_R[:, HIPS])[:, None]
-    upper, lower = legs[:, :, 0], legs[:, :, 1]
-    parts = (
-        np.broadcast_to(C[:, None], upper.shape),
-        to_hips @ upper,
-        transpose(upper) @ lower,
-        transpose(lower) @ foot,
-    )
-    return pose_6d(np.stack(parts, axis=2))
 
 
 def _about_x(R_ref: Array, angle: Array) -> Array:

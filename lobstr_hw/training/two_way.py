@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from lobstr_hw.lower_body import POSE_SIZE
 from lobstr_hw.predictors.two_way import in_chunks
 from lobstr_hw.training.averaging import add_to_average, with_average
+from lobstr_hw.training.borrowed_hands import with_borrowed_hands
 from lobstr_hw.training.carried import held_out_clips, keep_best, validate_carried
 from lobstr_hw.training.carried_losses import (
     ChunkTargets,
@@ -36,8 +37,8 @@ from lobstr_hw.training.schedule import set_learning_rate
 
 __all__ = ["InChunks", "counted_frames", "planted_term", "train_two_way"]
 
-_MARGINS = 2**32 - 1
-"""In a chunk's place in the seed: the generator that says which ends are scored."""
+_MARGINS, _HANDS = 2**32 - 1, 2**32 - 2
+"""In a chunk's place in the seed: for which ends are scored, and for whose hands are seen."""
 
 
 def train_two_way(
@@ -63,6 +64,9 @@ def _train_step(run: Run, source: EpisodeSource, config: TrainingConfig) -> list
     rate = set_learning_rate(run.optimizer, config, run.step)
     run.network.train()
     x, truth = _batch(source, config, run.step)
+    x = with_borrowed_hands(
+        x, config.carried.borrowed_hands, np.random.default_rng([config.seed, run.step, _HANDS])
+    )
     z = torch.from_numpy((x - run.stats.input_mean) / run.stats.input_scale)
     pose, logits = _through(run.network, z, config)
     terms = carried_losses(pose, logits, truth, config.weights)

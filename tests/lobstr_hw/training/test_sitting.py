@@ -8,7 +8,8 @@ from lobstr_hw.features import reference_frames
 from lobstr_hw.lower_body import leg_points_in_reference, pose_from_6d
 from lobstr_hw.rotations import Array
 from lobstr_hw.training.dataset import Clips
-from lobstr_hw.training.sitting import HIPS, sat_down
+from lobstr_hw.training.replaced_legs import HIPS
+from lobstr_hw.training.sitting import sat_down
 
 SEEDS = range(12)
 
