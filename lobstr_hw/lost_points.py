@@ -1,7 +1,8 @@
 """Where a point is that no tracker sees: it goes on with the part of the body next to it.
 
-A lost pelvis goes with the head, a lost head or hand with the pelvis. Only what happens from one
-step to the next is looked at, so there is nothing to remember but the last poses.
+A lost pelvis goes with the head and turns with head and hands, a lost head or hand goes with the
+pelvis. Only what happens from one step to the next is looked at, so there is nothing to remember
+but the last poses.
 """
 
 from dataclasses import dataclass
@@ -23,18 +24,27 @@ _UP = 1
 
 @dataclass(frozen=True, slots=True)
 class _Following:
-    """Who goes with whom, and with how much of its turn about the vertical and of its rise."""
+    """Who goes with whom.
+
+    Attributes:
+        leader: whose way is gone along with.
+        followers: who goes.
+        turns: shares of the turns about the vertical of pelvis, head and hands.
+        rise: share of the leader's.
+        seen: whether the leader has to be seen; else its guess will do.
+    """
 
     leader: int
     followers: tuple[int, ...]
-    turn: float
+    turns: tuple[float, float, float, float]
     rise: float
+    seen: bool
 
 
 _ORDER = (
     # people look around and bow without their hips: shares chosen on validation (docs/decisions.md)
-    _Following(_HEAD, (_PELVIS,), turn=0.5, rise=0.7),
-    _Following(_PELVIS, (_HEAD, _LEFT, _RIGHT), turn=1.0, rise=1.0),
+    _Following(_HEAD, (_PELVIS,), turns=(0.0, 0.45, 0.15, 0.15), rise=0.7, seen=True),
+    _Following(_PELVIS, (_HEAD, _LEFT, _RIGHT), turns=(1.0, 0.0, 0.0, 0.0), rise=1.0, seen=False),
 )
 HIGHEST_HIPS = 1.05
 """Metres on the standard skeleton, which stands at 1.0: hips lost in a bow do not float when the
@@ -81,21 +91,23 @@ def follow(before: Points, now: Points, seen: Bools) -> Points:
         led = list(one.followers)
         if not (lost_p[:, led].any() or lost_R[:, led].any()):
             continue
-        led_p = lost_p[:, led] & steady[:, one.leader, None]
-        led_R = lost_R[:, led] & steady[:, one.leader, None]
-        guess_p, guess_R = _led(one, before.p, before.R, p, R)
+        leads = steady[:, one.leader]
+        if one.seen:
+            leads = leads & ~(lost_p | lost_R)[:, one.leader]
+        led_p, led_R = lost_p[:, led] & leads[:, None], lost_R[:, led] & leads[:, None]
+        guess_p, guess_R = _led(one, before.p, before.R, p, R, steady)
         p[:, led] = np.where(led_p[..., None], guess_p, p[:, led])
         R[:, led] = np.where(led_R[..., None, None], guess_R, R[:, led])
     return Points(p, R, now.valid_p, now.valid_R, now.R_ref)
 
 
 def _led(
-    one: _Following, p_before: Array, R_before: Array, p: Array, R: Array
+    one: _Following, p_before: Array, R_before: Array, p: Array, R: Array, steady: Bools
 ) -> tuple[Array, Array]:
     """Poses (n, followers, ...) of all followers, lost or not."""
     led, leader = list(one.followers), one.leader
-    yaw, _ = heading_angle(R[:, leader] @ transpose(R_before[:, leader]))
-    turn = rotation_y(one.turn * yaw)[:, None]
+    yaws, _ = heading_angle(R @ transpose(R_before))  # (n, 4); of who is lost 0, or the guess's
+    turn = rotation_y((yaws * steady) @ np.array(one.turns))[:, None]
     arm = p_before[:, led] - p_before[:, None, leader]
     guess = p[:, None, leader] + (turn @ arm[..., None])[..., 0]
     rise = one.rise * (p[:, None, leader, _UP] - p_before[:, None, leader, _UP])

@@ -7,9 +7,9 @@ import pytest
 
 from lobstr_hw.features import Points
 from lobstr_hw.lost_points import HIGHEST_HIPS, follow
-from lobstr_hw.rotations import from_rotation_vector, rotation_y
+from lobstr_hw.rotations import from_rotation_vector, heading_angle, rotation_y
 
-PELVIS, HEAD, LEFT = range(3)
+PELVIS, HEAD, LEFT, RIGHT = range(4)
 ALL = np.ones((3, 4), dtype=bool)
 
 
@@ -54,6 +54,19 @@ def test_a_hand_stays_before_a_pelvis_that_turns() -> None:
     guess = follow(before, without(now, LEFT), ALL)
     assert guess.p == pytest.approx(now.p)
     assert guess.R == pytest.approx(now.R)
+
+
+def test_a_lost_pelvis_turns_with_head_and_hands_more_than_with_the_head_alone() -> None:
+    before, turn = lost_before(points(), PELVIS), rotation_y(0.1)
+
+    def yaw(*turning: int) -> float:
+        R = before.R.copy()
+        R[:, turning] = turn @ R[:, turning]
+        guess = follow(before, without(replace(before, R=R), PELVIS), ALL)
+        return float(heading_angle(guess.R[0, PELVIS] @ before.R[0, PELVIS].T)[0])
+
+    assert 0.0 < yaw(LEFT) < yaw(HEAD) < yaw(HEAD, LEFT) < yaw(HEAD, LEFT, RIGHT) < 0.1
+    assert yaw(LEFT) == pytest.approx(yaw(RIGHT))
 
 
 def test_what_is_measured_is_left_alone() -> None:
