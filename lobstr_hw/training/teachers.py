@@ -29,7 +29,7 @@ class Teachers:
         """Load the teachers of a pupil; they run on its device and in its precision.
 
         Raises:
-            ModelError: one is no run of the recipe ``carried``, or hears something else.
+            ModelError: one is no finished run of the recipe ``carried``, or hears something else.
         """
         self._config = config
         self._runs = [_teacher(Path(folder), config) for folder in config.teachers]
@@ -80,5 +80,10 @@ def _teacher(folder: Path, pupil: TrainingConfig) -> tuple[LobstrNetwork, Statis
             f"{config.feature_form!r}. Take runs of --recipe carried with {pupil.feature_form!r}."
         )
     run = load_checkpoint(folder / "checkpoint.pt", replace(config, device=pupil.device))
+    if run.step < config.steps:
+        raise ModelError(
+            f"{folder} cannot teach yet: it is at step {run.step:,} of {config.steps:,}. Finish it "
+            f"first: lobstr-train DATA --out {folder} --resume"
+        )
     run.network.load_state_dict(finished_weights(run))
     return run.network.eval(), run.stats

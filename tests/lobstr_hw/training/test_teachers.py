@@ -139,6 +139,12 @@ def test_only_live_networks_teach(clips: Clips, teachers: tuple[str, ...], tmp_p
         replace(paper, teachers=teachers)
 
 
+def test_who_has_not_finished_does_not_teach(clips: Clips, tmp_path: Path) -> None:
+    folder = kept(trained(clips, SMALL, steps=3), tmp_path / "half")
+    with pytest.raises(ModelError, match="at step 3 of 6.*--resume"):
+        heard(some_input(), str(folder))
+
+
 def test_the_card_tells_who_taught_but_not_where(
     clips: Clips, teachers: tuple[str, ...], tmp_path: Path
 ) -> None:
