@@ -126,7 +126,8 @@ def test_the_state_goes_on_from_chunk_to_chunk_and_is_zero_where_an_episode_begi
     from lobstr_hw.training.loop import train
     from lobstr_hw.training.streams import Position, Streams
 
-    config = replace(SMALL, learning_rate=0.0)
+    own_hands = replace(SMALL.carried, borrowed_hands=0.0)
+    config = replace(SMALL, learning_rate=0.0, carried=own_hands)
     run = new_run(config, statistics(clips, config))
     streams = Streams(EpisodeSource(clips, config), config, Position.start(config.batch))
     whole = torch.zeros(1, config.batch, config.hidden_size)
