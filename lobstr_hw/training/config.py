@@ -224,9 +224,10 @@ _TWO_WAY = replace(
     steps=2300,
     window=120,
     mirror_mean=False,
-    weights=LossWeights(pose=1.0, toe=1.0, velocity=4.5, contact=0.1),
     # every chunk is an episode of its own
-    carried=CarriedSettings(mean_chunks=1.0, sitting_share=0.5),
+    carried=CarriedSettings(
+        mean_chunks=1.0, sitting_share=0.5, stride_share=0.4, borrowed_hands=0.3
+    ),
     validate_every=575,
     checkpoint_every=50,
 )
