@@ -66,6 +66,7 @@ def processes() -> Iterator[Processes]:
     dist.init_process_group("cpu:gloo,cuda:nccl" if torch.cuda.is_available() else "gloo")
     try:
         yield Processes(count, dist.get_rank())
+        dist.barrier()  # who parts while another is still talking to it may end in an abort
     finally:
         dist.destroy_process_group()
 
