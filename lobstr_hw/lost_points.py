@@ -85,6 +85,7 @@ def follow(before: Points, now: Points, seen: Bools) -> Points:
     if not (lost_p.any() or lost_R.any()):
         return now
     steady = (before.valid_p | ~now.valid_p) & (before.valid_R | ~now.valid_R)  # not back just now
+    turning = steady & (now.valid_R | lost_R)  # what was never seen turns nobody
     p = np.where(lost_p[..., None], before.p, now.p)
     R = np.where(lost_R[..., None, None], before.R, now.R)
     for one in _ORDER:
@@ -95,19 +96,19 @@ def follow(before: Points, now: Points, seen: Bools) -> Points:
         if one.seen:
             leads = leads & ~(lost_p | lost_R)[:, one.leader]
         led_p, led_R = lost_p[:, led] & leads[:, None], lost_R[:, led] & leads[:, None]
-        guess_p, guess_R = _led(one, before.p, before.R, p, R, steady)
+        guess_p, guess_R = _led(one, before.p, before.R, p, R, turning)
         p[:, led] = np.where(led_p[..., None], guess_p, p[:, led])
         R[:, led] = np.where(led_R[..., None, None], guess_R, R[:, led])
     return Points(p, R, now.valid_p, now.valid_R, now.R_ref)
 
 
 def _led(
-    one: _Following, p_before: Array, R_before: Array, p: Array, R: Array, steady: Bools
+    one: _Following, p_before: Array, R_before: Array, p: Array, R: Array, turning: Bools
 ) -> tuple[Array, Array]:
     """Poses (n, followers, ...) of all followers, lost or not."""
     led, leader = list(one.followers), one.leader
     yaws, _ = heading_angle(R @ transpose(R_before))  # (n, 4); of who is lost 0, or the guess's
-    turn = rotation_y((yaws * steady) @ np.array(one.turns))[:, None]
+    turn = rotation_y(np.where(turning, yaws, 0.0) @ np.array(one.turns))[:, None]
     arm = p_before[:, led] - p_before[:, None, leader]
     guess = p[:, None, leader] + (turn @ arm[..., None])[..., 0]
     rise = one.rise * (p[:, None, leader, _UP] - p_before[:, None, leader, _UP])

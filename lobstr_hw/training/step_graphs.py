@@ -53,15 +53,16 @@ def step_nodes(kind: NetworkKind, state_size: int, latent: int, sides: int = 1) 
         node("Split", "heads heads_parts", "pose contact", axis=1),
         regroup("state_next", "side_rows", "h_next"),
     ]
-    sizes = {
-        "gate_rows": [-1, gates],
-        "state_rows": [-1, state_size],
-        "latent_rows": [-1, sides * latent],
-        "side_rows": [-1, sides * state_size],
-        "heads_parts": [POSE_SIZE, CONTACT_SIZE],
-    }
+    sizes = {"heads_parts": [POSE_SIZE, CONTACT_SIZE]}
     if kind == "gru":
         sizes["gate_parts"] = [2 * state_size, state_size]
+    if sides > 1:
+        sizes |= {
+            "gate_rows": [-1, gates],
+            "state_rows": [-1, state_size],
+            "latent_rows": [-1, sides * latent],
+            "side_rows": [-1, sides * state_size],
+        }
     return nodes, _int64(sizes)
 
 

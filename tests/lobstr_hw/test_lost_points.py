@@ -69,6 +69,19 @@ def test_a_lost_pelvis_turns_with_head_and_hands_more_than_with_the_head_alone()
     assert yaw(LEFT) == pytest.approx(yaw(RIGHT))
 
 
+def test_a_hand_that_was_never_seen_turns_no_pelvis() -> None:
+    before, seen = lost_before(points(), PELVIS, LEFT), ALL.copy()
+    seen[:, LEFT] = False
+    for placeholder in (
+        rotation_y(0.3) @ before.R[:, LEFT],
+        np.full((len(before.R), 3, 3), np.nan),
+    ):
+        now = without(replace(before, R=before.R.copy()), PELVIS, LEFT)
+        now.R[:, LEFT] = placeholder
+        guess = follow(before, now, seen)
+        assert guess.R[:, PELVIS] == pytest.approx(before.R[:, PELVIS])
+
+
 def test_what_is_measured_is_left_alone() -> None:
     before, now = points(0), points(1)
     now = replace(now, valid_p=without(now, PELVIS).valid_p)
